@@ -34,7 +34,7 @@ from table import WORKERS, drawn_means, keyed, markdown, measured, quantiles
 HELD_OUT = 10_000  # the first instance of the test split
 INSTANCES = 200
 SEEDS = 5
-STEPS = 200_000
+STEPS = 240_000
 TESTED = list(range(HELD_OUT, HELD_OUT + INSTANCES))
 LEVELS = {
     "easy": "FitImage-easy-v1",
@@ -66,7 +66,6 @@ BATCH = 256
 EPOCHS = 6
 LEARNING_RATE = 1.5e-3
 LOG_DEVIATION = -1.6
-POSTURE_DEGREES = 6.0  # of the people whom PPO trains on
 SHOWN = (12, 16)  # height and width of small pictures, where nothing is corrected
 NETWORKS: dict[str, list[int]] = {"pi": [384, 128], "vf": [128]}  # hidden layers
 # gentler steps of a taught network, after its estimates of rewards are learned
@@ -260,9 +259,7 @@ def trained(training: Training) -> Any:
     """Return the model of a learner after its training."""
     import torch
 
-    env = Corrections(
-        made(training, ENVIRONMENTS, errors=False, posture_degrees=POSTURE_DEGREES)
-    )
+    env = Corrections(made(training, ENVIRONMENTS, errors=False))
     continued = training.agent == CONTINUED
     rate = CONTINUED_RATE if continued else LEARNING_RATE
     model = ppo(to_sb3_vec_env(env), training.seed, rate)

@@ -30,7 +30,6 @@ from posefit.fitting.prior import Prior
 from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATIONS, Translation
 from posefit.fitting.validation import check_prior
 from posefit.geometry.body import varied
-from posefit.geometry.skeleton import ANGLES
 from posefit.motion import built_in
 from posefit.motion.clips import load_motion
 from posefit.motion.instances import (
@@ -95,7 +94,6 @@ class World:
     size: tuple[int, int] = (64, 48)
     noise: tuple[tuple[str, float], ...] = ()
     mismatch_percent: float = 0.0
-    posture_degrees: float = 0.0
     errors: bool = True
     evaluate: bool = False
 
@@ -215,8 +213,6 @@ def world_of(own: Sequence[str] = (), /, **arguments: Any) -> World:
         raise ArgumentError(f"size must be {what}, got {quoted(world.size)}")
     mismatch = checked(finite_number, "mismatch_percent", world.mismatch_percent)
     checked(between, "mismatch_percent", mismatch, 0.0, 50.0)
-    posture = checked(finite_number, "posture_degrees", world.posture_degrees)
-    checked(between, "posture_degrees", posture, 0.0, 30.0)
     if isinstance(world.train, str) or not all(
         isinstance(name, str) for name in world.train or ()
     ):
@@ -238,7 +234,6 @@ def world_of(own: Sequence[str] = (), /, **arguments: Any) -> World:
         size=(int(sides[0]), int(sides[1])),
         noise=_strengths(world.noise),
         mismatch_percent=mismatch,
-        posture_degrees=posture,
         errors=flag("errors", world.errors),
         evaluate=flag("evaluate", world.evaluate),
     )
@@ -446,23 +441,6 @@ def first_space(world: World, made: Instance) -> SearchSpace:
     return SearchSpace(world.learned, centre, reach, task.anchor, task.translation)
 
 
-def held_otherwise(truth: Motion, degrees: float, number: int) -> Motion:
-    """Return an instance's motion by somebody of another posture.
-
-    Every joint is off by the same angles in all frames, as people differ in how they
-    hold a shoulder or a knee.
-
-    Args:
-        truth: The motion.
-        degrees: The standard deviation of the angles.
-        number: The instance's number, which draws them.
-    """
-    offsets = generator("person", number, 1).normal(0.0, degrees, ANGLES - 3)
-    poses = truth.poses.copy()
-    poses[:, 3:] += np.radians(offsets)
-    return replace(truth, poses=poses)
-
-
 @lru_cache(maxsize=64)
 def instance(
     world: World, number: int, frames: int = 1, evaluations: int = 1
@@ -479,8 +457,6 @@ def instance(
         truth = motion_of_instance(source, number, frames=frames, fps=FPS)
     except ValueError as mistake:  # a file that is too short
         raise error.Error(str(mistake)) from None
-    if world.posture_degrees:
-        truth = held_otherwise(truth, world.posture_degrees, number)
     # for noise, yaw and build only: the instance's number gives motion and views
     rng = generator("scene", number)
     body = body_of(motion)

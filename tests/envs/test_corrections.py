@@ -122,21 +122,6 @@ def test_what_cannot_be_corrected_is_refused() -> None:
         drive(Corrections(native()), "sapso")
 
 
-def test_a_posture_is_an_instances_own_and_by_default_the_motions() -> None:
-    pictures = [
-        native(posture_degrees=degrees).reset(options={"instance": [3, 4, 3]})[0]
-        for degrees in (0.0, 6.0)
-    ]
-    assert np.array_equal(pictures[1][0], pictures[1][2])
-    for plain, other in zip(*pictures, strict=True):
-        assert not np.array_equal(plain, other)
-    assert np.array_equal(
-        pictures[0], native().reset(options={"instance": [3, 4, 3]})[0]
-    )
-    with pytest.raises(ArgumentError, match="posture_degrees must"):
-        native(posture_degrees=31.0)
-
-
 @each("name", sorted(path.stem for path in TRAINED.glob("*.npz")))
 def test_a_trained_policy_is_better_than_a_blind_search_and_has_a_card(
     name: str,
