@@ -272,7 +272,7 @@ def test_unknown_arguments_and_modes_are_named() -> None:
         gym.make("posefit/Track-v1", nois={"holes": 0.3})
     with pytest.raises(
         TypeError,
-        match="one of motion, .*, optimiser, .*, got 'optimizer'; did you mean 'optimiser'",
+        match=r"'optimizer'; did you mean 'optimiser'\?: it must be one of motion, .*, optimiser, ",
     ):
         gym.make("posefit/Race-v1", optimizer="cma")
     with pytest.raises(
