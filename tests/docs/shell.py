@@ -58,8 +58,11 @@ def check(words: list[str]) -> None:
     elif name == "python":
         path = ROOT / words[1]
         assert path.exists(), f"no file {words[1]}"
+        study = None
         if path.parent.name == "studies":
-            command, _ = _innermost(import_module(path.stem).main, words[2:])
+            study = getattr(import_module(path.stem), "main", None)
+        if isinstance(study, click.Command):
+            command, _ = _innermost(study, words[2:])
             options = {
                 option for parameter in command.params for option in parameter.opts
             }
