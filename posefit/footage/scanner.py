@@ -75,6 +75,7 @@ class Scanner:
         self,
         progress: Progress | None,
         changed: Callable[[int, Image], Image] | None = None,
+        watch: Callable[[int, Sequence[Person]], None] | None = None,
     ) -> Scan:
         """Return what each frame shows: the largest blob, and the people.
 
@@ -82,6 +83,7 @@ class Scanner:
             progress: Shows how far the pass is.
             changed: Returns the picture of a frame that the segmenter gets, given the
                 frame's index and its picture.
+            watch: Gets each frame's index and its people; it may end the pass.
 
         """
         video = self.scaled.video
@@ -99,6 +101,8 @@ class Scanner:
             camera.add(k, image)
             given = image if changed is None else changed(k, image)
             blobs, facing, points = self.segmenter.frame(given)
+            if watch is not None:
+                watch(k, blobs)
             facings.append(facing)
             landmarks.append(points)
             bits[k] = np.packbits(blobs[0].mask)

@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
-from posefit.errors import InputError, NoPersonError
+from posefit.errors import InputError, NoPersonError, PersonCutError
 from posefit.footage.cameras import combined, same_person
 from posefit.footage.cleaning import cleaned
 from posefit.footage.extraction import Extraction
@@ -214,6 +214,9 @@ def _of_films(
             views = _taken_out(parts, known, progress)
             doubts = [view.doubt for view in views if view.doubt]
             attempt = _Attempt(way.name, combine(views), doubts[0] if doubts else "")
+        except PersonCutError as error:
+            attempts.append(_Attempt(way.name, None, str(error)))
+            break
         except NoPersonError as error:
             attempt = _Attempt(way.name, None, str(error))
         attempts.append(attempt)
@@ -254,7 +257,7 @@ def _taken_out(
                 part.size,
                 filmed=part.video.size,
             )
-        view, _, doubt = part.read(progress.steps, choose)
+        view, _, doubt = part.read(progress.steps, choose, refuse_cut=True)
         if doubt is not None and doubt.refused:
             raise NoPersonError(doubt.text)
         # a track shows the pictures of the first camera only
