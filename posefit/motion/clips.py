@@ -176,6 +176,7 @@ def training_clips(
     stated: FileOptions = RECOGNISED,
     *,
     followed: Source | None = None,
+    straight: bool = False,
 ) -> list[SourceClip]:
     """Return the clips that sources name.
 
@@ -186,6 +187,8 @@ def training_clips(
         stated: what the files do not state.
         followed: the motion that is followed. A folder and the library are used
             without it.
+        straight: whether the people of the library get straight knees, as people in
+            footage have, see `RecordedClip.straightened`.
 
     Raises:
         InputError: there is no such motion, none is left, or the motions would take
@@ -195,7 +198,7 @@ def training_clips(
     poses = 0
     most = allowed_bytes()
     for source in sources:
-        for clip in _clips(source, stated, followed):
+        for clip in _clips(source, stated, followed, straight):
             clips.append(clip)
             poses += clip.count(FPS)
             _check_memory(poses, FPS, most)
@@ -223,7 +226,7 @@ def _check_memory(poses: int, fps: float, most: int) -> None:
 
 
 def _clips(
-    source: Source, stated: FileOptions, followed: Source | None
+    source: Source, stated: FileOptions, followed: Source | None, straight: bool
 ) -> Iterator[SourceClip]:
     if isinstance(source, str) and recorded.is_library(source):
         stem = _stem(followed)
@@ -233,7 +236,8 @@ def _clips(
                 "train must hold a clip other than the source, "
                 f"got {source} for {followed}"
             )
-        yield from (recorded_clip(clip) for clip in clips)
+        for clip in clips:
+            yield recorded_clip(clip.straightened if straight else clip)
     elif not isinstance(source, Motion) and Path(source).is_dir():
         paths = []
         for path in sorted(Path(source).iterdir()):
@@ -253,6 +257,8 @@ def _clips(
         yield from (clip_of(path, stated) for path in others)
     elif _same(source, followed):
         raise InputError(f"train must not contain the source itself, got {source}")
+    elif straight and recorded.is_recorded(source):
+        yield recorded_clip(recorded.clip(str(source)).straightened)
     else:
         yield clip_of(source, stated)
 
