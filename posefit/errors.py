@@ -41,10 +41,6 @@ class NoPersonError(InputError):
     """Masks do not show the person; another segmenter may find them."""
 
 
-class PersonCutError(NoPersonError):
-    """The picture's border cuts the person in all frames; no segmenter helps."""
-
-
 class PluginWarning(UserWarning):
     """A plugin is left out. The message, on one line, names it and says why."""
 

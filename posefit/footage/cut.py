@@ -1,7 +1,7 @@
 """Refuse a film soon if the picture's border cuts the person in all of its frames.
 
-Such a film is refused in any case, see `quality.verdict`, but only after every
-segmenter went through all of it.
+A pass by a segmenter is refused then in any case, see `quality.verdict`, but only after
+all frames.
 """
 
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from posefit.errors import PersonCutError
+from posefit.errors import NoPersonError
 from posefit.footage.people import AROUND, MIN_DETECTIONS
 from posefit.footage.quality import at_edge, changed_pixels
 from posefit.footage.scanner import Scanner
@@ -41,7 +41,7 @@ class CutWatch:
         """Add the people of frame k, counted from 0.
 
         Raises:
-            PersonCutError: The picture cuts the person in all frames that were looked
+            NoPersonError: The picture cuts the person in all frames that were looked
                 at, and nobody else moves.
 
         """
@@ -74,7 +74,7 @@ class CutWatch:
             looked += 1
         if cut > MOST * looked:
             room = scanner.stop - scanner.start
-            raise PersonCutError(
+            raise NoPersonError(
                 f"{scanner.scaled.video.path}: {at_edge(cut, looked)} looked at, of "
                 f"{room}"
             )

@@ -90,8 +90,8 @@ class Segmentation:
                 frames.
 
         Raises:
-            NoPersonError: No frame shows a person.
-            PersonCutError: The picture cuts the person in all frames.
+            NoPersonError: No frame shows a person, or the picture cuts the person in
+                all frames and `refuse_cut` is given.
 
         """
         watch = CutWatch(self._scanner).add if refuse_cut else None

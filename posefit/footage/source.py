@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
-from posefit.errors import InputError, NoPersonError, PersonCutError
+from posefit.errors import InputError, NoPersonError
 from posefit.footage.annotations import ANNOTATIONS, read_annotations
 from posefit.footage.cameras import combined, same_person
 from posefit.footage.cleaning import cleaned
@@ -223,9 +223,6 @@ def _of_films(
             views = _taken_out(parts, known, progress)
             doubts = [view.doubt for view in views if view.doubt]
             attempt = _Attempt(way.name, combine(views), doubts[0] if doubts else "")
-        except PersonCutError as error:
-            attempts.append(_Attempt(way.name, None, str(error)))
-            break
         except NoPersonError as error:
             attempt = _Attempt(way.name, None, str(error))
         attempts.append(attempt)

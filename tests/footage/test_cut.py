@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posefit.errors import NoPersonError, PersonCutError
+from posefit.errors import NoPersonError
 from posefit.footage.extraction import Extraction
 from posefit.footage.options import SourceOptions
 from posefit.footage.segmentation import Segmentation
@@ -111,5 +111,5 @@ def test_a_film_in_which_another_moves_is_not_refused_soon(
     assert len(read.view) == FRAMES
     alone = Video.of(numbered(tmp_path / "one.avi"))
     part = Segmentation(alone, Extraction("known"), ALL)
-    with pytest.raises(PersonCutError, match="looked at"):
+    with pytest.raises(NoPersonError, match="looked at"):
         part.read(refuse_cut=True)
