@@ -149,7 +149,7 @@ def standing_still(motion: Motion) -> Array:
     level = np.abs(np.diff(joints[:, ankles, 1], axis=1))[:, 0] < LEVEL_ANKLES
     height = joints[:, 0, 1] - joints[:, ankles, 1].min(axis=1)
     tall = height > np.quantile(height, 0.9) - TALL
-    return (speed[:, slow].max(axis=1) < STILL) & level & tall
+    return np.asarray((speed[:, slow].max(axis=1) < STILL) & level & tall)
 
 
 def strides_of(motion: Motion) -> Iterator[list[float]]:
@@ -186,7 +186,7 @@ def library_lines() -> Iterator[str]:
     cells = []
     for subject in recorded.subjects():
         still = []
-        strides = []
+        strides = list[list[float]]()
         for clip in recorded.clips([subject]):
             motion = clip.motion()
             still.append(flexions(motion.joints)[standing_still(motion)].mean(axis=1))
