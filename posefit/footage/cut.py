@@ -49,7 +49,7 @@ class CutWatch:
             return
         self._watching = not _is_whole(blobs)
         self._cut += blobs[0].touches_border
-        fps = self._scanner.scaled.video.fps
+        fps = self._scanner.video.fps
         if self._watching and self._cut >= SECONDS * fps:
             self._watching = False
             self._look(k + 1)
@@ -60,12 +60,12 @@ class CutWatch:
         segmenter = scanner.segmenter
         if not registry().offer("segmenter", scanner.how.name).still_background:
             # a network follows people: the pass's own is left as it is
-            segmenter = PersonSegmenter(scanner.scaled, scanner.how)
+            segmenter = PersonSegmenter(scanner.video, scanner.how)
         cut = self._cut
         looked = seen
         before: tuple[Image, Person] | None = None
         start = scanner.start + seen
-        for image in scanner.scaled.frames(start, scanner.stop, STEP):
+        for image in scanner.video.frames(start, scanner.stop, STEP):
             blobs = segmenter.frame(image).people
             if _is_whole(blobs) or (before and _others_move(image, blobs[0], *before)):
                 return
@@ -75,8 +75,7 @@ class CutWatch:
         if cut > MOST * looked:
             room = scanner.stop - scanner.start
             raise NoPersonError(
-                f"{scanner.scaled.video.path}: {at_edge(cut, looked)} looked at, of "
-                f"{room}"
+                f"{scanner.video.path}: {at_edge(cut, looked)} looked at, of {room}"
             )
 
 
