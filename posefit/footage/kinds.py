@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from posefit.errors import InputError
 from posefit.files import opencv_name
+from posefit.footage.annotations import ANNOTATIONS, read_annotations
 from posefit.footage.images import IMAGES, is_photo, page_count
 from posefit.footage.named import Footage, sources_of
 from posefit.footage.numbering import Images, images_in, numbered_together
@@ -38,7 +39,7 @@ from posefit.motion.motion import Motion
 from posefit.reading import existing
 
 # suffixes of other inputs: what ends in one of them is never tried as a video
-NO_VIDEO = (*IMAGES, *MOTIONS, *ARRAYS, ".asf")
+NO_VIDEO = (*IMAGES, *MOTIONS, *ARRAYS, ANNOTATIONS, ".asf")
 
 
 class _Unread(NamedTuple):
@@ -62,11 +63,11 @@ UNREAD = (
     ),
     _Unread(
         suffixes=(
-            *(".json", ".xml", ".csv", ".txt", ".yaml", ".yml", ".toml", ".zip"),
+            *(".xml", ".csv", ".txt", ".yaml", ".yml", ".toml", ".zip"),
             *(".mat", ".h5", ".hdf5", ".pkl", ".pickle", ".pt", ".pth"),
         ),
         what="masks and motions",
-        instead=f"masks as images or {' and '.join(ARRAYS)}, "
+        instead=f"masks as images or {', '.join(ARRAYS)} and {ANNOTATIONS}, "
         f"and motions as {' and '.join(MOTIONS)}",
     ),
 )
@@ -84,8 +85,8 @@ class Kind(NamedTuple):
 
     medium: Medium
     recognises: Callable[[Place], bool]
-    # (place, frames, label, fps) to the view
-    view: Callable[[Any, Range, int | None, float | None], View] | None = None
+    # (place, frames, label or category, fps) to the view
+    view: Callable[[Any, Range, Any, float | None], View] | None = None
     # (place, fps, width) to the film, scaled down to the width
     film: Callable[[Any, float | None, int], Video] | None = None
     # place to the number of its first frame; None if frames are counted from 0
@@ -126,6 +127,7 @@ KINDS = (
     Kind("masks", lambda place: isinstance(place, np.ndarray), view=read_array),
     Kind("masks", _ends_in(".npz"), view=read_npz, first=first_number),
     Kind("masks", _ends_in(".npy"), view=read_npy),
+    Kind("masks", _ends_in(ANNOTATIONS), view=read_annotations),
     Kind("pictures", _is_film, film=Video.of_pictures),
     Kind("masks", lambda place: isinstance(place, Images), view=read_images),
     Kind("video", _is_video, film=lambda place, _, width: Video.of(place, width)),

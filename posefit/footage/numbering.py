@@ -46,10 +46,10 @@ def images_in(folder: Path) -> list[Path]:
         hidden = file.name.startswith(".")
         if file.suffix.lower() in IMAGES and not hidden:
             files.append(file)
-    return sorted(files, key=_natural)
+    return sorted(files, key=natural)
 
 
-def _natural(file: Path) -> tuple[Sequence[tuple[int, str]], str]:
+def natural(file: Path) -> tuple[Sequence[tuple[int, str]], str]:
     """Return a sorting key by which 2 comes before 10, and numbers after text."""
     key = list[tuple[int, str]]()
     for part in re.findall(r"[0-9]+|[^0-9]+", file.name):

@@ -80,6 +80,12 @@ def _path(name: str, value: Any) -> str | Path:
     return value
 
 
+def _category(name: str, value: Any) -> str:
+    if not isinstance(value, str):
+        raise InputError(f"{name} must be a name, got {quoted(value)}")
+    return value
+
+
 def _cameras(name: str, value: Any) -> tuple[Any, ...]:
     """Return cameras, calibrations or names of files as a tuple."""
     from posefit.geometry.calibration import Calibration
@@ -239,6 +245,13 @@ class SourceOptions(Options):
         "Value or colour of the person in masks.",
         0,
         parse=text_label,
+        live=False,
+    )
+    category: str | None = option(
+        None,
+        "Category of the person in annotations. Default: person, or the only one.",
+        _category,
+        "NAME",
         live=False,
     )
     holes: float | None = number_option(

@@ -215,10 +215,7 @@ def verdict(
     none = f"expected masks of a person, got none in any of {len(rows)} frames{instead}"
     cut = sum(bool(row["touches_border"]) for row in rows)
     if cut > MOST * len(rows):
-        none = (
-            "expected a person who is whole in the picture, got one at its edge in "
-            f"{cut} of {len(rows)} frames"
-        )
+        none = at_edge(cut, len(rows))
     if len(whole) < MIN_DETECTIONS:
         return None if usable else Verdict(none, True)
     outside = float(np.median([row["beside"] for row in whole]))
@@ -259,6 +256,17 @@ def verdict(
     else:
         return None
     return Verdict(f"{text}{instead}", refused)
+
+
+def at_edge(cut: int, count: int) -> str:
+    """Return what is wrong with a film whose border cuts the person.
+
+    It does in `cut` of `count` frames.
+    """
+    return (
+        "expected a person who is whole in the picture, got one at its edge in "
+        f"{cut} of {count} frames"
+    )
 
 
 def advice(method: str, *, learned: bool) -> str:

@@ -72,6 +72,7 @@ class Scanner:
         self,
         progress: Progress | None,
         changed: Callable[[int, Image], Image] | None = None,
+        watch: Callable[[int, Sequence[Person]], None] | None = None,
     ) -> Scan:
         """Return what each frame shows: the largest blob, and the people.
 
@@ -79,6 +80,7 @@ class Scanner:
             progress: Shows how far the pass is.
             changed: Returns the picture of a frame that the segmenter gets, given the
                 frame's index and its picture.
+            watch: Gets each frame's index and its people; it may end the pass.
 
         """
         video = self.video
@@ -92,7 +94,7 @@ class Scanner:
         bits = empty_planes(room, size)
         known = empty_planes(room, size)
         # a second core segments the next frames while people are told apart in this one
-        frames = ahead(self._segmented(changed))
+        frames = ahead(self._segmented(changed, watch))
         for k, frame in enumerate(progress(frames, room) if progress else frames):
             image, (blobs, facing, points) = frame
             camera.add(k, image)
@@ -123,15 +125,21 @@ class Scanner:
         return Scan(view, people, rows.largest, rows.blanks, self.how.person)
 
     def _segmented(
-        self, changed: Callable[[int, Image], Image] | None
+        self,
+        changed: Callable[[int, Image], Image] | None,
+        watch: Callable[[int, Sequence[Person]], None] | None,
     ) -> Iterator[tuple[Image, SegmentedFrame]]:
         """Yield each frame's picture, and what the segmenter finds in it.
 
-        `changed` is as for `scan`.
+        `changed` and `watch` are as for `scan`.
         """
         for k, image in enumerate(self.video.frames(self.start, self.stop)):
             given = image if changed is None else changed(k, image)
-            yield image, self.segmenter.frame(given)
+            found = self.segmenter.frame(given)
+            if watch is not None:
+                # here, because it may use the segmenter, too
+                watch(k, found.people)
+            yield image, found
 
 
 class _Rows:

@@ -9,6 +9,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import NoPersonError
+from posefit.footage.cut import CutWatch
 from posefit.footage.extraction import Extraction
 from posefit.footage.facing import facings_on_the_spot
 from posefit.footage.identities import with_identities
@@ -72,7 +73,11 @@ class Segmentation:
             self._all_people = Scanner(video, among, frames)
 
     def read(
-        self, progress: Progress | None = None, choose: Chooser | None = None
+        self,
+        progress: Progress | None = None,
+        choose: Chooser | None = None,
+        *,
+        refuse_cut: bool = False,
     ) -> Segmented:
         """Segment the video, after the background was learned.
 
@@ -80,12 +85,16 @@ class Segmentation:
             progress: Shows how far the pass is.
             choose: Returns the number of the person to follow, instead of the
                 extraction's `person`.
+            refuse_cut: Whether to stop soon if the picture cuts the person in all
+                frames.
 
         Raises:
-            NoPersonError: No frame shows a person.
+            NoPersonError: No frame shows a person, or the picture cuts the person in
+                all frames and `refuse_cut` is given.
 
         """
-        scan = self._scanner.scan(progress)
+        watch = CutWatch(self._scanner).add if refuse_cut else None
+        scan = self._scanner.scan(progress, watch=watch)
         if self._all_people is not None:
             scan = with_identities(self._all_people, self._scanner, scan, progress)
         if choose is not None:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, cast
 
 from posefit.errors import InputError, NoPersonError
+from posefit.footage.annotations import ANNOTATIONS, read_annotations
 from posefit.footage.cameras import combined, same_person
 from posefit.footage.cleaning import cleaned
 from posefit.footage.extraction import Extraction
@@ -32,6 +33,7 @@ from posefit.motion import built_in
 from posefit.motion.asf import Acclaim, parse_asf
 from posefit.motion.clips import FPS, FileOptions, Source, load_motion
 from posefit.progress import QUIET, Progress
+from posefit.reading import quoted
 
 SIZE = (320, 240)  # width and height of rendered masks, by default
 
@@ -98,7 +100,8 @@ def _of_footage(source: Resolved, options: SourceOptions, progress: Progress) ->
     if films:
         scene = _of_films(films, known, how, options.frames, progress, combine)
     else:
-        views = views_of_masks(source, options.frames, options.label, options.fps)
+        wanted = options.label if options.category is None else options.category
+        views = views_of_masks(source, options.frames, wanted, options.fps)
         scene = combine(_of_one_person(views, known, options))
     return replace(
         scene,
@@ -159,7 +162,7 @@ def films_of(source: Resolved, width: int, fps: float | None = None) -> list[Vid
 def views_of_masks(
     source: Resolved,
     frames: Range = (None, None),
-    label: int | None = None,
+    label: int | str | None = None,
     fps: float | None = None,
 ) -> list[View]:
     """Return the views of a source of masks, one per camera, of the same frames.
@@ -167,7 +170,8 @@ def views_of_masks(
     Args:
         source: Masks; other sources have no views yet.
         frames: Which frames to read.
-        label: The person's value, for masks with several labels.
+        label: The person's value, for masks with several labels, or category, for
+            annotations.
         fps: Frames per second; by default what the source states.
 
     Raises:
@@ -176,6 +180,11 @@ def views_of_masks(
     """
     views = list[View]()
     for kind, place in zip(source.kinds, source.places, strict=True):
+        if isinstance(label, str) and kind.view is not read_annotations:
+            raise InputError(
+                f"category must be given for annotations ({ANNOTATIONS}) only, "
+                f"got {quoted(label)}"
+            )
         if kind.view is not None:
             views.append(kind.view(place, frames, label, fps))
     return together(views)
@@ -260,7 +269,7 @@ def _segmented(
                 part.video.size,
                 filmed=part.video.filmed,
             )
-        view, _, doubt = part.read(progress.steps, choose)
+        view, _, doubt = part.read(progress.steps, choose, refuse_cut=True)
         if doubt is not None and doubt.refused:
             raise NoPersonError(doubt.text)
         # a track shows the pictures of the first camera only

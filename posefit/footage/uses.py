@@ -29,6 +29,7 @@ _USED_FOR = {
     "extraction": _Use("video", ["video", "pictures"]),
     "fps": _Use("motions, masks and pictures", ["motion", "masks", "pictures"]),
     "label": _Use("masks", ["masks"]),
+    "category": _Use("annotations", ["masks"]),
     "holes": _Use("masks", ["masks"]),
     "height": _Use("footage", _FOOTAGE),
     "person": _Use("footage", _FOOTAGE),

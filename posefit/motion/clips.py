@@ -180,6 +180,7 @@ def training_clips(
     stated: FileOptions = RECOGNISED,
     *,
     followed: Source | None = None,
+    straight: bool = False,
 ) -> list[SourceClip]:
     """Return the clips that sources name.
 
@@ -190,6 +191,8 @@ def training_clips(
         stated: what the files do not state.
         followed: the motion that is followed. A folder and the library are used
             without it.
+        straight: whether the people of the library get straight knees, as people in
+            footage have, see `RecordedClip.straightened`.
 
     Raises:
         InputError: there is no such motion, none is left, or the motions would take
@@ -199,7 +202,7 @@ def training_clips(
     poses = 0
     most = allowed_bytes()
     for source in sources:
-        for clip in _clips(source, stated, followed):
+        for clip in _clips(source, stated, followed, straight):
             clips.append(clip)
             poses += clip.count(FPS)
             # after each clip, so that a folder of too many is refused before all are
@@ -229,7 +232,7 @@ def _check_memory(poses: int, fps: float, most: int) -> None:
 
 
 def _clips(
-    source: Source, stated: FileOptions, followed: Source | None
+    source: Source, stated: FileOptions, followed: Source | None, straight: bool
 ) -> Iterator[SourceClip]:
     if isinstance(source, str) and recorded.is_library(source):
         stem = _stem(followed)
@@ -239,7 +242,8 @@ def _clips(
                 "train must hold a clip other than the source, "
                 f"got {source} for {followed}"
             )
-        yield from (recorded_clip(clip) for clip in clips)
+        for clip in clips:
+            yield recorded_clip(clip.straightened if straight else clip)
     elif not isinstance(source, Motion) and Path(source).is_dir():
         paths = []
         for path in sorted(Path(source).iterdir()):
@@ -259,6 +263,8 @@ def _clips(
         yield from (clip_of(path, stated) for path in others)
     elif _same(source, followed):
         raise InputError(f"train must not contain the source itself, got {source}")
+    elif straight and recorded.is_recorded(source):
+        yield recorded_clip(recorded.clip(str(source)).straightened)
     else:
         yield clip_of(source, stated)
 

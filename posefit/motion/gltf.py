@@ -1,8 +1,10 @@
 """The moving body as one .glb file: glTF 2.0 of the Khronos Group.
 
-Blender, browsers and game engines open it. Each bone has a node at the bone's start,
-with the bone's cone as its mesh; an animation turns the nodes. Lengths are metres and
-y is up. Left limbs are orange and right ones blue, as in the viewer.
+Blender, browsers and game engines open it, with an armature: each bone has a joint at
+the bone's start, with the bone's name in BVH files, and an animation turns the joints.
+One skinned mesh has a tapered cone for each bone, which moves with this bone alone.
+Lengths are metres and y is up. Left limbs are orange and right ones blue, as in the
+viewer.
 """
 
 import json
@@ -16,7 +18,17 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.geometry.rotation import along_y, quaternions
-from posefit.geometry.skeleton import BONES, INNER, PARENTS, side
+from posefit.geometry.skeleton import (
+    ANGLES,
+    BONES,
+    ENDS,
+    INNER,
+    JOINTS,
+    PARENTS,
+    Skeleton,
+    side,
+)
+from posefit.motion.bvh import NAMES
 from posefit.motion.motion import Motion
 
 COLOURS = {
@@ -48,28 +60,24 @@ def write_glb(path: str | Path, motion: Motion, radii: Array) -> None:
     """
     skeleton = motion.skeleton
     data = _Buffer()
-    sides = list(COLOURS)
-    nodes: list[dict[str, Any]] = [{"name": "root"}]
-    meshes = []
-    for bone, name in enumerate(BONES):
-        start = PARENTS[bone + 1]
-        at = skeleton.offsets[start - 1] if start else np.zeros(3)
-        nodes.append({"name": name, "mesh": bone, "translation": at.tolist()})
-        nodes[start].setdefault("children", []).append(bone + 1)
-        points, normals, corners = _capped_cone(skeleton.offsets[bone], radii[bone])
-        primitive = {
-            "attributes": {
-                "POSITION": data.add(points, ARRAY, True),
-                "NORMAL": data.add(normals, ARRAY),
-            },
-            "indices": data.add(corners, ELEMENTS),
-            "material": sides.index(side(name)),
-        }
-        meshes.append({"name": name, "primitives": [primitive]})
+    nodes = _armature(skeleton)
+    body = len(nodes)
+    nodes.append({"name": "body", "mesh": 0, "skin": 0})
+    at_rest = skeleton.joints(np.zeros(ANGLES))
+    starts = at_rest[[0, *PARENTS[1:]]]
+    # no joint is turned at rest, so a shift leads from the world to it
+    binds = np.tile(np.eye(4), (body, 1, 1))
+    binds[:, 3, :3] = -np.concatenate([starts, at_rest[[*ENDS]]])
+    skin = {
+        "joints": [*range(body)],
+        "skeleton": 0,
+        "inverseBindMatrices": data.add(binds.reshape(-1, 16), None),
+    }
+    mesh = {"name": "body", "primitives": _parts(data, skeleton.offsets, starts, radii)}
     times = data.add(
         (motion.first + np.arange(len(motion)))[:, None] / motion.fps, None, True
     )
-    turns = motion.skeleton.turns(motion.poses)
+    turns = skeleton.turns(motion.poses)
     moved = [(0, "translation", motion.translations)]
     moved += [(joint, "rotation", quaternions(turns[joint])) for joint in (0, *INNER)]
     samplers: list[dict[str, Any]] = []
@@ -78,17 +86,15 @@ def write_glb(path: str | Path, motion: Motion, radii: Array) -> None:
         target = {"node": node, "path": moving}
         channels.append({"sampler": len(samplers), "target": target})
         samplers.append({"input": times, "output": data.add(values, None)})
-    materials = []
-    for name, colour in COLOURS.items():
-        looks = {**MATT, "baseColorFactor": [*colour, 1.0]}
-        materials.append({"name": name, "pbrMetallicRoughness": looks})
     document = {
         "asset": {"version": "2.0", "generator": "posefit"},
         "scene": 0,
-        "scenes": [{"nodes": [0]}],
+        # a skinned mesh is placed by its joints: it is beside them, not below
+        "scenes": [{"nodes": [0, body]}],
         "nodes": nodes,
-        "meshes": meshes,
-        "materials": materials,
+        "skins": [skin],
+        "meshes": [mesh],
+        "materials": _materials(),
         "animations": [{"name": "track", "samplers": samplers, "channels": channels}],
         "accessors": data.accessors,
         "bufferViews": data.views,
@@ -108,6 +114,73 @@ def write_glb(path: str | Path, motion: Motion, radii: Array) -> None:
     )
 
 
+def _armature(skeleton: Skeleton) -> list[dict[str, Any]]:
+    """Return the root, a joint where each bone starts, and where the last bones end."""
+    nodes: list[dict[str, Any]] = [{"name": NAMES["root"]}]
+    for bone, name in enumerate(BONES):
+        start = PARENTS[bone + 1]
+        at = skeleton.offsets[start - 1] if start else np.zeros(3)
+        nodes.append({"name": NAMES[name], "translation": at.tolist()})
+        nodes[start].setdefault("children", []).append(bone + 1)
+    for joint in ENDS:
+        # programs draw a bone from a joint to the next
+        nodes[joint]["children"] = [len(nodes)]
+        name = f"{NAMES[JOINTS[joint]]}_End"
+        at = skeleton.offsets[joint - 1]
+        nodes.append({"name": name, "translation": at.tolist()})
+    return nodes
+
+
+def _parts(
+    data: "_Buffer", offsets: Array, starts: Array, radii: Array
+) -> list[dict[str, Any]]:
+    """Return the mesh at rest, which has a part for the bones of each colour.
+
+    Args:
+        data: The buffer that its arrays are added to.
+        offsets: The vectors (26, 3) from the bones' starts to their ends.
+        starts: Where the joints' bones (27, 3) start; the first is the root.
+        radii: The radii (26, 2) of the bones' cones.
+    """
+    parts = []
+    for material, colour in enumerate(COLOURS):
+        points = []
+        normals = []
+        corners = []
+        joints = []
+        count = 0
+        for bone, name in enumerate(BONES):
+            if side(name) != colour:
+                continue
+            cone = _capped_cone(offsets[bone], radii[bone])
+            points.append(cone[0] + starts[bone + 1])
+            normals.append(cone[1])
+            corners.append(cone[2] + count)
+            joints.append(np.full((len(cone[0]), 4), [bone + 1, 0, 0, 0]))
+            count += len(cone[0])
+        moved = np.concatenate(joints)
+        attributes = {
+            "POSITION": data.add(np.concatenate(points), ARRAY, True),
+            "NORMAL": data.add(np.concatenate(normals), ARRAY),
+            "JOINTS_0": data.add(moved, ARRAY),
+            # a cone moves with one bone alone
+            "WEIGHTS_0": data.add(np.tile(np.eye(4)[0], (len(moved), 1)), ARRAY),
+        }
+        indices = data.add(np.concatenate(corners), ELEMENTS)
+        part = {"attributes": attributes, "indices": indices, "material": material}
+        parts.append(part)
+    return parts
+
+
+def _materials() -> list[dict[str, Any]]:
+    """Return a matt material for each of the colours."""
+    materials = []
+    for name, colour in COLOURS.items():
+        looks = {**MATT, "baseColorFactor": [*colour, 1.0]}
+        materials.append({"name": name, "pbrMetallicRoughness": looks})
+    return materials
+
+
 class _Buffer:
     """The binary part of a file, and its description in glTF."""
 
@@ -122,20 +195,22 @@ class _Buffer:
         """Add an array, and return its number.
 
         Args:
-            values: vectors (n, k), stored with 32 bits, or indices (n,) with 16.
+            values: Vectors (n, k), or single values (n,). Whole numbers are stored with
+                16 bits, others with 32.
             target: glTF's number for the use, or None.
             bounds: whether to state the smallest and the largest values.
         """
-        indices = values.ndim == 1
-        raw = values.astype("<u2" if indices else "<f4")
+        whole = np.issubdtype(values.dtype, np.integer)
+        raw = values.astype("<u2" if whole else "<f4")
         view = {"buffer": 0, "byteOffset": len(self.bytes), "byteLength": raw.nbytes}
         if target is not None:
             view["target"] = target
         self.views.append(view)
-        kind = "SCALAR" if indices or raw.shape[1] == 1 else f"VEC{raw.shape[1]}"
+        width = raw[:1].size
+        kind = {1: "SCALAR", 16: "MAT4"}.get(width, f"VEC{width}")
         accessor: dict[str, Any] = {
             "bufferView": len(self.views) - 1,
-            "componentType": SHORT if indices else FLOAT,
+            "componentType": SHORT if whole else FLOAT,
         }
         accessor |= {"count": len(raw), "type": kind}
         if bounds:

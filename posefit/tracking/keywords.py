@@ -35,6 +35,7 @@ class _Keywords(TypedDict, total=False):
     extraction: "Extraction | None"
     height: float | None
     label: int | None
+    category: str | None
     holes: float | None
     person: "Choice | None"
     method: "str | TrackerFactory | tuple[str | OptimiserFactory, str | Prior] | None"

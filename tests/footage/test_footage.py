@@ -385,7 +385,7 @@ def test_a_mistake_with_footage_leaves_one_line(
         ("walk.trc", "PathFileType", "motions of .trc are not read; .amc and .bvh are"),
         ("walk.C3D", "x", "motions of .c3d are not read; .amc and .bvh are"),
         ("walk.fbx", "x", "motions of .fbx are not read; .amc and .bvh are"),
-        ("rle.json", "{}", "masks and motions of .json are not read; masks as images"),
+        ("rle.json", "{}", "expected COCO's lists images, annotations and categories"),
         ("poses.pkl", "x", "masks and motions of .pkl are not read; masks as images"),
         ("noext", "x", "a name that ends in what the file is, such as .mp4"),
         ("missing.trc", None, "expected a file, got nothing of that name"),

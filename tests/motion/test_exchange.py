@@ -2,6 +2,7 @@
 
 import json
 import struct
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -11,9 +12,10 @@ from scipy.spatial.transform import Rotation
 
 from posefit.arrays import Array
 from posefit.geometry.body import Body
-from posefit.geometry.skeleton import BONES, JOINTS, PARENTS
+from posefit.geometry.skeleton import BONES, ENDS, JOINTS, PARENTS
 from posefit.measuring.centres import PLACES
 from posefit.motion import built_in
+from posefit.motion.bvh import NAMES
 from posefit.motion.gltf import write_glb
 from posefit.motion.opensim import DENSITY, write_mot, write_osim
 
@@ -112,9 +114,9 @@ def test_opensims_joints_are_posefits(tmp_path: Path) -> None:
     )
 
 
-def test_a_glb_file_holds_the_joints_and_closed_shapes(tmp_path: Path) -> None:
-    write_glb(tmp_path / "track.glb", MOTION, BODY.radii)
-    raw = (tmp_path / "track.glb").read_bytes()
+def read_glb(path: Path) -> tuple[dict[str, Any], Callable[[int], Array]]:
+    """Return the description in a .glb file, and a reader of its arrays by number."""
+    raw = path.read_bytes()
     magic, version, total, size, kind = struct.unpack("<4sII I4s", raw[:20])
     assert (magic, version, total, kind) == (b"glTF", 2, len(raw), b"JSON")
     document = json.loads(raw[20 : 20 + size])
@@ -124,7 +126,7 @@ def test_a_glb_file_holds_the_joints_and_closed_shapes(tmp_path: Path) -> None:
     def values(number: int) -> Array:
         accessor = document["accessors"][number]
         view = document["bufferViews"][accessor["bufferView"]]
-        width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[accessor["type"]]
+        width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}[accessor["type"]]
         kind = {5126: "<f4", 5123: "<u2"}[accessor["componentType"]]
         found = np.frombuffer(
             binary, kind, accessor["count"] * width, view["byteOffset"]
@@ -136,56 +138,98 @@ def test_a_glb_file_holds_the_joints_and_closed_shapes(tmp_path: Path) -> None:
             )
         return found.astype(np.float64)
 
-    nodes, (animation,) = document["nodes"], document["animations"]
-    tracks = {
-        (one["target"]["node"], one["target"]["path"]): values(
-            animation["samplers"][one["sampler"]]["output"]
-        )
-        for one in animation["channels"]
-    }
-    for frame in (0, 6):
-        world: dict[int, Array] = {}
+    return document, values
 
-        def place(
-            node: int, above: Array, frame: int = frame, world: dict[int, Array] = world
-        ) -> None:
-            turn = tracks.get((node, "rotation"), np.array([[0.0, 0.0, 0.0, 1.0]] * 7))[
-                frame
-            ]
-            at = (
-                tracks[0, "translation"][frame]
-                if node == 0
-                else nodes[node]["translation"]
+
+def nodes_of(
+    document: dict[str, Any], values: Callable[[int], Array], frame: int | None
+) -> list[Array]:
+    """Return the frame (4, 4) of each node in a frame of the animation, or at rest."""
+    nodes = document["nodes"]
+    moved: dict[tuple[int, str], Array] = {}
+    if frame is not None:
+        (animation,) = document["animations"]
+        for one in animation["channels"]:
+            samples = values(animation["samplers"][one["sampler"]]["output"])
+            moved[one["target"]["node"], one["target"]["path"]] = samples[frame]
+    world = [np.eye(4)] * len(nodes)
+
+    def place(number: int, above: Array) -> None:
+        node = nodes[number]
+        turn = moved.get((number, "rotation"), np.array([0.0, 0.0, 0.0, 1.0]))
+        at = moved.get((number, "translation"), node.get("translation", np.zeros(3)))
+        world[number] = above @ affine(Rotation.from_quat(turn).as_matrix(), at)
+        for child in node.get("children", []):
+            place(child, world[number])
+
+    for root in document["scenes"][0]["nodes"]:
+        place(root, np.eye(4))
+    return world
+
+
+def test_a_glb_files_armature_moves_as_the_joints_do(tmp_path: Path) -> None:
+    write_glb(tmp_path / "track.glb", MOTION, BODY.radii)
+    document, values = read_glb(tmp_path / "track.glb")
+    (skin,) = document["skins"]
+    names = [document["nodes"][number]["name"] for number in skin["joints"]]
+    ends = [f"{NAMES[JOINTS[joint]]}_End" for joint in ENDS]
+    assert names == [*(NAMES[joint] for joint in JOINTS), *ends]
+    shown = [0, *PARENTS[1:], *ENDS]
+    binds = values(skin["inverseBindMatrices"]).reshape(-1, 4, 4).swapaxes(1, 2)
+    at_rest = nodes_of(document, values, None)
+    for number, bind in zip(skin["joints"], binds, strict=True):
+        # at rest the skin is where the mesh is
+        np.testing.assert_allclose(at_rest[number] @ bind, np.eye(4), atol=1e-6)
+    (mesh,) = document["meshes"]
+    for frame in range(len(MOTION)):
+        world = nodes_of(document, values, frame)
+        places = np.array([world[number][:3, 3] for number in skin["joints"]])
+        np.testing.assert_allclose(places, MOTION.joints[frame][shown], atol=1e-6)
+        for part in mesh["primitives"]:
+            attributes = part["attributes"]
+            points = values(attributes["POSITION"])
+            weights = values(attributes["WEIGHTS_0"])
+            np.testing.assert_array_equal(weights.sum(axis=1), 1.0)
+            joints = values(attributes["JOINTS_0"]).astype(int)
+            moving = np.array(
+                [
+                    world[number] @ bind
+                    for number, bind in zip(skin["joints"], binds, strict=True)
+                ]
             )
-            world[node] = above @ affine(Rotation.from_quat(turn).as_matrix(), at)
-            for child in nodes[node].get("children", []):
-                place(child, world[node])
+            blended = (weights[..., None, None] * moving[joints]).sum(axis=1)
+            skinned = (
+                blended @ np.column_stack([points, np.ones(len(points))])[..., None]
+            )
+            # each cone surrounds its bone, in every pose
+            joint = joints[:, 0]
+            start = MOTION.joints[frame][list(PARENTS)][joint]
+            along = MOTION.joints[frame][joint] - start
+            length = np.linalg.norm(along, axis=1)
+            reach = skinned[:, :3, 0] - start
+            share = np.clip((reach * along).sum(axis=1) / length**2, 0.0, 1.0)
+            away = np.linalg.norm(reach - share[:, None] * along, axis=1)
+            assert (away <= BODY.radii[joint - 1].max(axis=1) + 1e-6).all()
 
-        place(document["scenes"][0]["nodes"][0], np.eye(4))
-        starts = np.array([world[joint][:3, 3] for joint in range(1, len(JOINTS))])
-        np.testing.assert_allclose(
-            starts, MOTION.joints[frame][list(PARENTS[1:])], atol=1e-5
-        )
-    for mesh, offset, (first, last) in zip(
-        document["meshes"], MOTION.skeleton.offsets, BODY.radii, strict=True
-    ):
-        (part,) = mesh["primitives"]
+
+def test_a_glb_files_cones_are_closed(tmp_path: Path) -> None:
+    write_glb(tmp_path / "track.glb", MOTION, BODY.radii)
+    document, values = read_glb(tmp_path / "track.glb")
+    (mesh,) = document["meshes"]
+    volumes = np.zeros(len(BONES))
+    for part in mesh["primitives"]:
         points = values(part["attributes"]["POSITION"])
-        corners = points[values(part["indices"]).astype(int).reshape(-1, 3)]
-        inside = (
-            np.einsum(
-                "ni,ni->n", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])
-            ).sum()
-            / 6.0
+        indices = values(part["indices"]).astype(int).reshape(-1, 3)
+        corners = points[indices]
+        (owners,) = values(part["attributes"]["JOINTS_0"])[indices[:, 0]].T[:1]
+        inside = np.einsum(
+            "ni,ni->n", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])
         )
-        # a cone and two half balls, whose corners lie on them: a little less
-        length = np.linalg.norm(offset)
-        volume = (
-            np.pi
-            * (
-                length * (first**2 + first * last + last**2)
-                + 2.0 * (first**3 + last**3)
-            )
-            / 3.0
-        )
-        assert 0.88 * volume < inside < volume
+        np.add.at(volumes, owners.astype(int) - 1, inside / 6.0)
+    # a cone and two half balls, whose corners lie on them: a little less
+    first, last = BODY.radii.T
+    length = MOTION.skeleton.lengths
+    cone = length * (first**2 + first * last + last**2)
+    whole = np.pi * (cone + 2.0 * (first**3 + last**3)) / 3.0
+    assert (volumes > 0.88 * whole).all()
+    assert (volumes < whole).all()

@@ -1,0 +1,97 @@
+"""Refuse a film soon if the picture's border cuts the person in all of its frames.
+
+A pass by a segmenter is refused then in any case, see `quality.verdict`, but only after
+all frames.
+"""
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from posefit.errors import NoPersonError
+from posefit.footage.people import AROUND, MIN_DETECTIONS
+from posefit.footage.quality import at_edge, changed_pixels
+from posefit.footage.scanner import Scanner
+from posefit.footage.segmenter import PersonSegmenter
+from posefit.footage.views import MOST
+from posefit.registry import registry
+from posefit.silhouette.foreground import Image, Person
+from posefit.silhouette.pieces import RIVAL_AREA
+
+# a person who is cut in all frames for this long may be cut in the others, too
+SECONDS = 2.0
+# frames between those looked at: a person who is whole in fewer is hardly worth it
+STEP = MIN_DETECTIONS
+
+
+class CutWatch:
+    """Watches a pass through a film, frame after frame.
+
+    As long as whoever is in the picture is cut, nothing is known. After two seconds of
+    cut people, it looks ahead, at every eighth frame to the end of the film.
+    """
+
+    def __init__(self, scanner: Scanner) -> None:
+        self._scanner = scanner
+        self._watching = True
+        self._cut = 0  # frames with cut people
+
+    def add(self, k: int, blobs: Sequence[Person]) -> None:
+        """Add the people of frame k, counted from 0.
+
+        Raises:
+            NoPersonError: The picture cuts the person in all frames that were looked
+                at, and nobody else moves.
+
+        """
+        if not self._watching:
+            return
+        self._watching = not _is_whole(blobs)
+        self._cut += blobs[0].touches_border
+        fps = self._scanner.video.fps
+        if self._watching and self._cut >= SECONDS * fps:
+            self._watching = False
+            self._look(k + 1)
+
+    def _look(self, seen: int) -> None:
+        """Look at the frames after the first ones."""
+        scanner = self._scanner
+        segmenter = scanner.segmenter
+        if not registry().offer("segmenter", scanner.how.name).still_background:
+            # a network follows people: the pass's own is left as it is
+            segmenter = PersonSegmenter(scanner.video, scanner.how)
+        cut = self._cut
+        looked = seen
+        before: tuple[Image, Person] | None = None
+        start = scanner.start + seen
+        for image in scanner.video.frames(start, scanner.stop, STEP):
+            blobs = segmenter.frame(image).people
+            if _is_whole(blobs) or (before and _others_move(image, blobs[0], *before)):
+                return
+            before = image, blobs[0]
+            cut += blobs[0].touches_border
+            looked += 1
+        if cut > MOST * looked:
+            room = scanner.stop - scanner.start
+            raise NoPersonError(
+                f"{scanner.video.path}: {at_edge(cut, looked)} looked at, of {room}"
+            )
+
+
+def _is_whole(blobs: Sequence[Person]) -> bool:
+    """Return whether a frame shows somebody whom the picture's border does not cut."""
+    return any(blob.area and not blob.touches_border for blob in blobs)
+
+
+def _others_move(image: Image, person: Person, then: Image, earlier: Person) -> bool:
+    """Return whether as much moves far from the person as another one would.
+
+    A network may report the person who is cut while another is whole.
+    """
+    mask = person.mask | earlier.mask
+    reach = round(AROUND * max(cv2.boundingRect(mask.astype(np.uint8))[2:]))
+    kernel = np.ones((2 * reach + 1, 2 * reach + 1), dtype=np.uint8)
+    near = cv2.dilate(mask.astype(np.uint8), kernel) > 0
+    moved = (changed_pixels(image, then) & ~near).sum()
+    return bool(moved > RIVAL_AREA * max(person.area, earlier.area))
