@@ -129,7 +129,8 @@ class Corrections(VectorWrapper[Any, Any, Any, Any, Any]):
         proposals = self._best + reach[:, None] * np.clip(actions, -1.0, 1.0)
         if self._goes_round:
             proposals[:, 0] = (proposals[:, 0] + 1.0) % 2.0 - 1.0
-        return np.clip(proposals, -1.0, 1.0)
+        clipped: Array = np.clip(proposals, -1.0, 1.0)
+        return clipped
 
     def _begin(self, rows: Flags, pictures: Any) -> None:
         """Forget the proposals of some rows, and see their silhouettes."""
