@@ -59,9 +59,7 @@ def costs_of_steps(exemplars: Exemplars, before: Beam, root: Array | None) -> Ar
 
 
 @each("root", [None, np.array([0.0, 0.0, 0.05])])
-def test_next_states_are_those_of_the_slow_twin(
-    small: Exemplars, root: Array | None
-) -> None:
+def test_next_states_equal_the_slow_twins(small: Exemplars, root: Array | None) -> None:
     places = (
         np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 5.0]])
         if root is None

@@ -42,7 +42,7 @@ def test_every_joint_is_in_one_part() -> None:
     assert sorted(np.concatenate(PARTS)) == list(range(len(JOINTS)))
 
 
-def test_what_steps_cost_by_hand() -> None:
+def test_costs_of_steps_by_hand() -> None:
     def cost(code: float, rate: float, later: float, later_rate: float) -> float:
         return float(
             part_step_costs(
@@ -149,9 +149,7 @@ def test_the_right_one_of_two_hypotheses_is_reported_even_where_the_path_is_turn
     )
 
 
-def test_what_an_earlier_track_had_is_tried_with_exchanged_and_with_other_limbs() -> (
-    None
-):
+def test_poses_of_an_earlier_track_are_tried_with_exchanged_and_other_limbs() -> None:
     walk = walk_of(built_in.motion("walk-a", frames=2), (0.0, 90.0))
     truth = walk.motion.poses[:1]
     arm = angles_of(LIMBS["left arm"])
@@ -194,7 +192,7 @@ def test_what_an_earlier_track_had_is_tried_with_exchanged_and_with_other_limbs(
 
 
 @each(("alone", "weight"), [(False, 4.0), (True, 1.0)])
-def test_beside_an_earlier_track_clips_count_half_as_much_against_two_views(
+def test_with_an_earlier_track_and_two_views_clips_count_half_as_much(
     alone: bool, weight: float
 ) -> None:
     walk = walk_of(built_in.motion("walk-a", frames=2), (0.0, 90.0))
