@@ -455,7 +455,7 @@ def picture(row: Mapping[str, Any], path: str) -> None:
     "--picture",
     "drawn",
     metavar="FILE",
-    help="PNG to write: eight proposals of the first pose network.",
+    help="PNG to write: eight proposals of the first PPO.",
 )
 @click.option(
     "--policies",
@@ -474,8 +474,8 @@ def main(
     workers: int | None,
 ) -> None:
     check_learners()
-    if drawn is not None and POSING not in (agents or LEARNERS):
-        raise InputError(f"--picture must come with the agent {POSING}")
+    if drawn is not None and "PPO" not in (agents or LEARNERS):
+        raise InputError("--picture must come with the agent PPO")
     turns = []
     for level in names or ("default",):
         turns += [Training(level, agent, 0, 0) for agent in CONSTANTS]
@@ -500,7 +500,7 @@ def main(
         for line in table([row for turn, row in done.items() if turn.level == level]):
             click.echo(line)
     if drawn is not None:
-        picture(next(done[turn] for turn in turns if turn.agent == POSING), drawn)
+        picture(next(done[turn] for turn in turns if turn.agent == "PPO"), drawn)
 
 
 if __name__ == "__main__":
