@@ -29,8 +29,11 @@ from clips import (
     CHANGES,
     EVALUATIONS,
     GROUPS,
+    METHOD,
     PAIRS,
+    RUNS,
     SIDES,
+    WALKS,
     Clip,
     Views,
     cell_fields,
@@ -40,9 +43,11 @@ from clips import (
 from posefit.arrays import Array
 from posefit.cli.output import Command
 from posefit.footage.scene import Scene
+from posefit.settings import settings_of
 from posefit.statistics.means import mean_interval
 from posefit.sweep.cell import cell_scene
 from posefit.sweep.check import cell_of
+from posefit_exemplars.tracker import ExemplarTracker
 from table import WORKERS, Row, earlier, keyed, markdown, measured
 
 PACKAGE = "posefit_exemplars"
@@ -62,33 +67,55 @@ MODULES = (
 )
 CELL = "cell"  # a change of `cell.FIELD` is one of the cell's fields
 AS_IT_IS = "as it is"
-# Constants that are no choice of their own: they follow from others, fix the layout of
-# arrays, or are in arrays that are learned once and kept on disk.
-FIXED = (
-    "COARSE_GROUPS",
-    "CONTINUED_EVALUATIONS",
-    "DIMENSIONS",
-    "DISTANCE",
-    "ELEVATION",
-    "FIELD_OF_VIEW",
-    "FIRST_DIMENSIONS",
-    "FRESH_EVALUATIONS",
-    "GROUPS",
-    "LANES",
-    "LIMB_EVALUATIONS",
-    "MIN_EVALUATIONS",
-    "MIN_FIT_EVALUATIONS",
-    "MIN_FRAME_DISTANCE",
-    "MIN_SMALL_SIDE",
-    "PICTURE",
-    "POSES",
-    "RNG_STREAM_TABLE",
-    "SIDE",
-    "STEP_EVALUATIONS",
-    "TOTAL_BINS",
-    "YAWS",
-    "YAW_STEP",
-)
+# Constants that are not halved and doubled, by the reason.
+FIXED: Mapping[str, Sequence[str]] = {
+    "they follow from other constants": (
+        "CONTINUED_EVALUATIONS",
+        "FRESH_EVALUATIONS",
+        "LIMB_EVALUATIONS",
+        "MIN_EVALUATIONS",
+        "MIN_FIT_EVALUATIONS",
+        "YAW_STEP",
+    ),
+    "they lay out arrays, and change rounding at most": (
+        "FIRST_DIMENSIONS",
+        "LANES",
+        "TOTAL_BINS",
+    ),
+    "they keep numbers finite": ("MAX_KERNEL_COST",),
+    "MIN_SMALL_SIDE chooses among them": ("SMALL_FACTORS",),
+    "they name a stream of random numbers": ("RNG_STREAM_TABLE",),
+    "arrays on disk are learned with them": (
+        "COARSE_GROUPS",
+        "DIMENSIONS",
+        "DISTANCE",
+        "ELEVATION",
+        "FIELD_OF_VIEW",
+        "GROUPS",
+        "MIN_FRAME_DISTANCE",
+        "PICTURE",
+        "POSES",
+        "SIDE",
+        "YAWS",
+    ),
+    "they change the posterior, not the pose: see posterior.py": (
+        "MODE_DISTANCE",
+        "POSTERIOR_TEMPERATURE",
+    ),
+    "only other methods use them: see starts.py": (
+        "CANDIDATES",
+        "COSTS_SHARE",
+        "MAX_DISTANCE",
+        "TEMPERATURE",
+    ),
+    "docs/studies/follow.py measured them": ("STEP_EVALUATIONS",),
+    "these tracks have no later passes, known yaws or spins": (
+        "FAST_TURN_COST",
+        "LIMB_POSES",
+        "LIMB_ROUNDS",
+        "WRONG_YAW_COST",
+    ),
+}
 OFF = 1e9  # of a spread or a cost: so large that what depends on it says nothing
 TINY = 1e-9  # of a share or a cost
 FRAMES = 24  # of a clip, at most
@@ -126,18 +153,25 @@ MECHANISMS: Mapping[str, Change] = {
 }
 
 
+# The groups in the order in which their clips are tracked: most changes show first in
+# turns and dances.
+ORDER = ("turns", "dances", WALKS, "everyday", "jumps", RUNS)
+
+
 class Situation(NamedTuple):
     """The conditions of some of the tracks."""
 
     views: Views
     every: int  # one of so many tracks has them
     fields: Mapping[str, Any]  # of the cell
+    frames: int = FRAMES  # of a clip, at most
 
 
 SITUATIONS: Mapping[str, Situation] = {
     "one camera": Situation(SIDES[1], 1, {}),
     "two cameras": Situation(PAIRS[1], 2, {}),
     "one camera, all worse": Situation(SIDES[1], 2, CHANGES["all of these"]),
+    "one picture": Situation(SIDES[1], 1, {}, frames=1),
 }
 
 
@@ -150,23 +184,48 @@ class Run(NamedTuple):
 
 
 def constants() -> dict[str, Change]:
-    """Return each numeric constant of the tracker halved, and doubled."""
-    owners: dict[str, tuple[str, float]] = {}
+    """Return each numeric constant and setting of the tracker halved, and doubled."""
+    fixed = {name for names in FIXED.values() for name in names}
+    owners: dict[str, tuple[str, Any]] = {}
     for module in MODULES:
         for name, value in vars(importlib.import_module(f"{PACKAGE}.{module}")).items():
-            is_number = isinstance(value, int | float) and not isinstance(value, bool)
-            if name.isupper() and is_number and value != 0 and name not in FIXED:
-                # one imported from another module is changed with that one
-                owners.setdefault(name, (module, value))
+            if not name.isupper() or name in fixed or not scaled(name, value, 2.0):
+                continue
+            # one imported from another module is changed with that one
+            if owners.get(name, (module, value))[1] is not value:
+                owners[f"{module}.{name}"] = module, value
+            owners.setdefault(name, (module, value))
     changes: dict[str, Change] = {}
-    for name, (module, value) in owners.items():
-        for factor in (0.5, 2.0):
-            changed: float = value * factor
-            if isinstance(value, int):
-                changed = round(changed)
-            if changed not in (value, 0):
-                changes[f"{name} = {changed:.3g}"] = {f"{module}.{name}": changed}
+    for factor, word in ((0.5, "halved"), (2.0, "doubled")):
+        for name, (module, value) in owners.items():
+            other = scaled(name, value, factor)
+            if other != value:
+                place = f"{module}.{name.rpartition('.')[2]}"
+                changes[f"{name} {word}"] = {place: other}
+        for setting in settings_of(ExemplarTracker):
+            other = scaled(setting.name, setting.default, factor)
+            settings = {f"{METHOD}.{setting.name}": other}
+            changes[f"{setting.name} {word}"] = {f"{CELL}.settings": settings}
     return changes
+
+
+def scaled(name: str, value: Any, factor: float) -> Any:
+    """Return a number, or all numbers of a constant, times a factor; None for others.
+
+    A share that would exceed 1 becomes half of the rest larger.
+    """
+    if isinstance(value, Mapping):
+        members = {key: scaled(name, one, factor) for key, one in value.items()}
+        return None if None in members.values() else members
+    if isinstance(value, tuple):
+        scaled_members = tuple(scaled(name, one, factor) for one in value)
+        return None if None in scaled_members else scaled_members
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    if name.endswith("_SHARE") and factor * value >= 1.0:
+        return 0.5 * (1.0 + value)
+    product = value * factor
+    return max(round(product), 1) if isinstance(value, int) else product
 
 
 @contextmanager
@@ -197,7 +256,7 @@ def tracked(run: Run, change: Change) -> dict[str, Any]:
     # no track's CPU time contains the learning of its library
     learn_library(clip, situation.views)
     fields = cell_fields(
-        clip, situation.views, FRAMES, seed=run.number, **situation.fields
+        clip, situation.views, situation.frames, seed=run.number, **situation.fields
     )
     for place, value in change.items():
         owner, _, name = place.partition(".")
@@ -229,19 +288,18 @@ def true_pose(scene: Scene, _training: Array, frame: int, *_: Any) -> Array:
 
 def clip_of(number: int) -> Clip:
     """Return a clip: of each group in turn, and of each group another every time."""
-    groups = list(GROUPS.values())
-    group = groups[number % len(groups)]
-    return group[number // len(groups) % len(group)]
+    group = GROUPS[ORDER[number % len(ORDER)]]
+    return group[number // len(ORDER) % len(group)]
 
 
 def jobs_of(
-    changes: Mapping[str, Change], tracks: int
+    changes: Mapping[str, Change], tracks: int, situations: Sequence[str]
 ) -> dict[Run, Callable[[], dict[str, Any]]]:
     """Return the tracks that are compared, by what they are of."""
     jobs: dict[Run, Callable[[], dict[str, Any]]] = {}
     for number in range(tracks):
-        for name, situation in SITUATIONS.items():
-            if number % situation.every:
+        for name in situations:
+            if number % SITUATIONS[name].every:
                 continue
             for change in changes:
                 run = Run(change, name, number)
@@ -313,6 +371,14 @@ def _percent(log: float) -> str:
     "--only", multiple=True, metavar="TEXT", help="Changes whose name holds this."
 )
 @click.option(
+    "--situation",
+    "situations",
+    type=click.Choice(list(SITUATIONS)),
+    multiple=True,
+    default=tuple(SITUATIONS),
+    help="Conditions of the tracks; by default all.",
+)
+@click.option(
     "--ledger", metavar="FILE", help="Finished tracks: the same command continues."
 )
 @click.option("--print", "only_print", is_flag=True, help="Run nothing further.")
@@ -321,6 +387,7 @@ def main(
     of_constants: bool,
     tracks: int,
     only: tuple[str, ...],
+    situations: tuple[str, ...],
     ledger: str | None,
     only_print: bool,
     workers: int | None,
@@ -334,7 +401,9 @@ def main(
     if only_print:
         results = finished(ledger)
     else:
-        results = measured(jobs_of(changes, tracks), ledger, keyed(Run), workers)
+        results = measured(
+            jobs_of(changes, tracks, situations), ledger, keyed(Run), workers
+        )
     for line in lines(results, list(changes)):
         click.echo(line)
 
