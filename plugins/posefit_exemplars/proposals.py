@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.fitting.contours import STEP_EVALUATIONS, race_count
+from posefit.fitting.contours import race_count
 from posefit.fitting.tracker import Task
 from posefit.geometry.skeleton import JOINTS, LIMBS, angles_of
 from posefit.geometry.symmetry import exchanged_limbs
@@ -26,11 +26,12 @@ from posefit_exemplars.cost_model import (
     root_deviation_costs,
     squared_distances,
 )
+from posefit_exemplars.estimate import Estimate
 from posefit_exemplars.exemplars import Exemplars, Rows
+from posefit_exemplars.fits import CONTINUED_EVALUATIONS, FRESH_EVALUATIONS
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import Hypotheses
 from posefit_exemplars.lookup import YAW_STEP, Lookup
-from posefit_exemplars.smoothing import Estimate
 
 BEAM_STATES = 400  # states that a frame keeps
 # Each candidate is also tried with this turn away from its clip, to either side.
@@ -41,12 +42,6 @@ CONTINUED_SHARE = 0.25
 SEARCHED_GROUPS = 200  # best groups of a search everywhere, at most
 GROUP_POSES = 20  # poses of each such group that are evaluated, drawn at random
 
-# Metres, for each step of a fit. Contours that are farther away count less.
-FRESH_REACHES = (0.09, 0.09, 0.065, 0.065, 0.045, 0.045, 0.033, 0.033)
-CONTINUED_REACHES = (0.15, 0.09, 0.065, 0.045, 0.033)
-FRESH_EVALUATIONS = len(FRESH_REACHES) * STEP_EVALUATIONS + 1.0
-# Two of the evaluations compare the places to start at.
-CONTINUED_EVALUATIONS = len(CONTINUED_REACHES) * STEP_EVALUATIONS + 3.0
 # Evaluations per frame, at least: two fresh hypotheses and one that continues.
 MIN_FIT_EVALUATIONS = 2 * FRESH_EVALUATIONS + CONTINUED_EVALUATIONS
 FRESH_SHARE = 0.45  # share of the evaluations for fresh hypotheses
@@ -254,7 +249,10 @@ class StateProposals:
         )
 
     def _placed(self, frame_costs: FrameCosts, beam: Beam) -> Beam:
-        """Return states with aligned roots."""
+        """Return states at the known root, or with aligned roots."""
+        if self._task.translation == "known":
+            # the poses, which would take long to copy, do not matter
+            return replace(beam, places=frame_costs.at_root(beam.places))
         places = frame_costs.aligned(poses_of(self.exemplars, beam), beam.places)
         return replace(beam, places=places)
 

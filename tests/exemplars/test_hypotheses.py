@@ -16,10 +16,10 @@ from posefit_exemplars.cost_model import (
     max_part_cost,
     part_step_costs,
 )
+from posefit_exemplars.estimate import Estimate
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import Hypotheses
 from posefit_exemplars.proposals import Counts
-from posefit_exemplars.smoothing import Estimate
 from posefit_exemplars.tracker import ExemplarTracker
 from tests.cases import each
 from tests.exemplars.conftest import Walk, walk_of

@@ -84,14 +84,17 @@ def test_the_way_that_is_told_is_the_cheapest_of_all() -> None:  # RABINER1989 (
             costs = ways(one, count)
             best = min(costs, key=lambda way: costs[way])
             assert [
-                markov.viterbi_state(one.frames[k:count]) for k in range(count)
+                markov.viterbi_state([frame.paths for frame in one.frames[k:count]])
+                for k in range(count)
             ] == list(best)
             each = [
                 min(cost for way, cost in costs.items() if way[-1] == row)
                 for row in range(SIZES[count - 1])
             ]
             np.testing.assert_allclose(
-                one.frames[count - 1].totals, np.array(each) - min(each), atol=1e-12
+                one.frames[count - 1].paths.totals,
+                np.array(each) - min(each),
+                atol=1e-12,
             )
 
 
