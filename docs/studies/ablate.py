@@ -12,9 +12,15 @@ the tracker as it is, as a geometric mean, with the 95 % interval for other clip
 seeds; and the median ratio of CPU times. A change that makes no difference in any
 column shows that its mechanism can go. Finished tracks are kept in a file, where the
 same command continues.
+
+To see what another cost model does, track before and after it, and compare:
+
+    ablate.py --only "as it is" --ledger before.jsonl
+    ablate.py --only "as it is" --ledger after.jsonl --against before.jsonl
 """
 
 import importlib
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -47,6 +53,7 @@ from posefit.settings import settings_of
 from posefit.statistics.means import mean_interval
 from posefit.sweep.cell import cell_scene
 from posefit.sweep.check import cell_of
+from posefit.tracking.result import Track
 from posefit_exemplars.tracker import ExemplarTracker
 from table import WORKERS, Row, earlier, keyed, markdown, measured
 
@@ -274,9 +281,18 @@ def tracked(run: Run, change: Change) -> dict[str, Any]:
         **run._asdict(),
         "clip": clip.name,
         "mpjpe_mm": track.measures.mpjpe_mm,
+        "root_mm": root_error(track, scene),
         "lost": track.measures.lost_rate,
         "cpu_ms": 1e3 * seconds / cell.frames,
     }
+
+
+def root_error(track: Track, scene: Scene) -> float:
+    """Return the mean distance of the root from the true one, in mm."""
+    assert scene.truth is not None
+    places = np.array([frame.translation for frame in track.frames])
+    distances = np.linalg.norm(places - scene.truth.translations, axis=1)
+    return 1e3 * float(distances.mean())
 
 
 def true_pose(scene: Scene, _training: Array, frame: int, *_: Any) -> Array:
@@ -312,48 +328,69 @@ def finished(path: str | None) -> dict[Run, Row]:
     return earlier(path, keyed(Run))
 
 
-def lines(results: Mapping[Run, Row], changes: Sequence[str]) -> Iterator[str]:
+def lines(
+    results: Mapping[Run, Row],
+    changes: Sequence[str],
+    before: Mapping[Run, Row] | None = None,
+    figure: str = "mpjpe_mm",
+) -> Iterator[str]:
     """Yield a table with a line for each change.
 
     An unfinished track is left out, as are the tracks that would be compared with it.
+
+    Args:
+        results: The tracks of this tracker.
+        changes: The names of the changes.
+        before: The tracks that each change is compared with, which may be of another
+            tracker; by default those of this tracker as it is.
+        figure: The error that is compared.
+
     """
     heads = ["change"]
     for name in SITUATIONS:
         heads += [f"{name}: % more", "95 % interval", "tracks"]
     heads.append("CPU")
-    table = []
+    usual = {}
+    for run, row in (results if before is None else before).items():
+        if run.change == AS_IT_IS:
+            usual[run] = row
+    table = [_usual_line("before" if before else AS_IT_IS, usual, figure)]
     for change in changes:
+        if change == AS_IT_IS and before is None:
+            continue
         line = [change]
         cpu = list[float]()
         for name in SITUATIONS:
-            pairs = [
-                (row, results[run._replace(change=AS_IT_IS)])
-                for run, row in results.items()
-                if run.change == change
-                and run.situation == name
-                and run._replace(change=AS_IT_IS) in results
-            ]
-            if not pairs:
-                line += ["-", "", "0"]
-                continue
-            errors = np.array(
-                [[row["mpjpe_mm"] for row in pair] for pair in pairs]
-            )  # (tracks, 2)
-            cpu += [row["cpu_ms"] / usual["cpu_ms"] for row, usual in pairs]
-            if change == AS_IT_IS:
-                middle = float(np.exp(np.log(errors[:, 1]).mean()))
-                line += [f"{middle:.1f} mm", "", str(len(pairs))]
-                continue
-            line += [*_more(np.log(errors[:, 0] / errors[:, 1])), str(len(pairs))]
+            logs = list[float]()
+            for run, row in results.items():
+                other = usual.get(run._replace(change=AS_IT_IS))
+                if run.change == change and run.situation == name and other:
+                    logs.append(math.log(row[figure] / other[figure]))
+                    cpu.append(row["cpu_ms"] / other["cpu_ms"])
+            line += [*_more(np.array(logs)), str(len(logs))]
         table.append([*line, f"{np.median(cpu):.2f}" if cpu else "-"])
     yield from markdown(heads, table)
+
+
+def _usual_line(name: str, usual: Mapping[Run, Row], figure: str) -> list[str]:
+    """Return the line of the tracks that others are compared with: mean errors."""
+    line = [name]
+    for situation in SITUATIONS:
+        errors = [
+            row[figure] for run, row in usual.items() if run.situation == situation
+        ]
+        middle = f"{np.exp(np.log(errors).mean()):.1f} mm" if errors else "-"
+        line += [middle, "", str(len(errors))]
+    return [*line, "1.00"]
 
 
 def _more(logs: Array) -> list[str]:
     """Return how much larger errors are, in percent, from logarithms of ratios (n,)."""
     count = len(logs)
-    if count < 2:
-        return [f"{_percent(float(logs.mean()))}", ""]
+    if not count:
+        return ["-", ""]
+    if count == 1:
+        return [_percent(float(logs[0])), ""]
     mean = mean_interval(logs, np.zeros(count), np.arange(count))
     return [_percent(mean.value), f"{_percent(mean.low)} to {_percent(mean.high)}"]
 
@@ -366,7 +403,7 @@ def _percent(log: float) -> str:
 @click.option(
     "--constants", "of_constants", is_flag=True, help="Halve and double constants."
 )
-@click.option("--tracks", type=click.IntRange(2), default=24, show_default=True)
+@click.option("--tracks", type=click.IntRange(1), default=24, show_default=True)
 @click.option(
     "--only", multiple=True, metavar="TEXT", help="Changes whose name holds this."
 )
@@ -381,6 +418,18 @@ def _percent(log: float) -> str:
 @click.option(
     "--ledger", metavar="FILE", help="Finished tracks: the same command continues."
 )
+@click.option(
+    "--against",
+    metavar="FILE",
+    help="The ledger of another tracker, with which all changes are compared.",
+)
+@click.option(
+    "--figure",
+    type=click.Choice(["mpjpe_mm", "root_mm"]),
+    default="mpjpe_mm",
+    show_default=True,
+    help="The error that is compared.",
+)
 @click.option("--print", "only_print", is_flag=True, help="Run nothing further.")
 @WORKERS
 def main(
@@ -389,6 +438,8 @@ def main(
     only: tuple[str, ...],
     situations: tuple[str, ...],
     ledger: str | None,
+    against: str | None,
+    figure: str,
     only_print: bool,
     workers: int | None,
 ) -> None:
@@ -404,7 +455,8 @@ def main(
         results = measured(
             jobs_of(changes, tracks, situations), ledger, keyed(Run), workers
         )
-    for line in lines(results, list(changes)):
+    before = finished(against) if against else None
+    for line in lines(results, list(changes), before, figure):
         click.echo(line)
 
 
