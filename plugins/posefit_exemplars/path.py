@@ -158,7 +158,7 @@ class ClipPath:
             return _PathFrame(
                 replace(beam, totals=paths.totals), paths, frame_costs, evaluations
             )
-        steps = ClipSteps.of(self.exemplars, latest.beam, self._step, frame_costs.root)
+        steps = ClipSteps.of(self.exemplars, latest.beam, self._step)
         if frame_costs.usable:
             proposed, used = self._proposals.next(
                 frame_costs, steps, small, everywhere, rng
@@ -170,7 +170,12 @@ class ClipPath:
             beam = replace(beam, places=frame_costs.at_root(beam.places))
             costs = np.zeros(len(beam))
             evaluations = 0.0
-        step_costs = steps.costs(self.exemplars, beam, frame_costs.camera_position)
+        step_costs = steps.costs(
+            self.exemplars,
+            beam,
+            frame_costs.camera_position,
+            aligned=frame_costs.root is None,
+        )
         paths = markov.likeliest_paths(costs, latest.paths, step_costs)
         return _PathFrame(
             replace(beam, totals=paths.totals), paths, frame_costs, evaluations
@@ -418,7 +423,7 @@ class HypothesisPath:
             self._noise.add(least)
         if before is None:
             return markov.frame_states(costs), exchanged_given(likelihoods, exchanged)
-        steps = self._costs.of_steps(frame_costs, before.hypotheses, hypotheses, noise)
+        steps = self._costs.of_steps(frame_costs, before.hypotheses, hypotheses)
         # what landmarks cost depends on which groups were exchanged before
         steps += landmarks - landmarks.min(axis=0)
         states = markov.frame_states(costs, before.states, steps)

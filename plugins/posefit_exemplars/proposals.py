@@ -67,7 +67,6 @@ def next_states(exemplars: Exemplars, steps: ClipSteps, count: int) -> Beam:
     sources = kernels.Sources(
         beam.totals,
         steps.codes,
-        steps.root_costs,
         exemplars.near_groups(steps.codes),
     )
     least = beam.totals.min()
