@@ -48,12 +48,14 @@ from clips import (
 )
 from posefit.arrays import Array
 from posefit.cli.output import Command
+from posefit.errors import InputError
 from posefit.footage.scene import Scene
 from posefit.settings import settings_of
 from posefit.statistics.means import mean_interval
 from posefit.sweep.cell import cell_scene
 from posefit.sweep.check import cell_of
 from posefit.tracking.result import Track
+from posefit.version import posefit_build, source_digest
 from posefit_exemplars.tracker import ExemplarTracker
 from table import WORKERS, Row, earlier, keyed, markdown, measured
 
@@ -276,6 +278,7 @@ def tracked(run: Run, change: Change) -> dict[str, Any]:
         seconds = time.process_time() - began
     return {
         **run._asdict(),
+        "build": build(),
         "clip": clip.name,
         "mpjpe_mm": track.measures.mpjpe_mm,
         "root_mm": root_error(track, scene),
@@ -323,6 +326,21 @@ def jobs_of(
 def finished(path: str | None) -> dict[Run, Row]:
     """Return the tracks in a file, all of which are finished."""
     return earlier(path, keyed(Run))
+
+
+def build() -> str:
+    """Return a name for this state of the sources of posefit and of the tracker."""
+    return f"{posefit_build()} {source_digest(PACKAGE)}"
+
+
+def check_build(path: str) -> None:
+    """Raise InputError if a file has tracks of other sources."""
+    for row in finished(path).values():
+        if row.get("build") != build():
+            raise InputError(
+                f"{path} has tracks of other sources: name a new file, "
+                f"and compare both with --against {path}"
+            )
 
 
 def lines(
@@ -449,6 +467,8 @@ def main(
     if only_print:
         results = finished(ledger)
     else:
+        if ledger:
+            check_build(ledger)
         results = measured(
             jobs_of(changes, tracks, situations), ledger, keyed(Run), workers
         )

@@ -39,8 +39,10 @@ CANDIDATE_TURN = np.radians(7.0)
 # Share of the proposed states for where clips continue. The others are for a search
 # everywhere.
 CONTINUED_SHARE = 0.25
-SEARCHED_GROUPS = 200  # best groups of a search everywhere, at most
-GROUP_POSES = 20  # poses of each such group that are evaluated, drawn at random
+# A search everywhere gives this share of its costs to poses that are similar to the
+# cheapest ones: so many of each one's group, drawn at random.
+SIMILAR_SHARE = 0.25
+GROUP_POSES = 20
 
 # Evaluations per frame, at least: two fresh hypotheses and one that continues.
 MIN_FIT_EVALUATIONS = 2 * FRESH_EVALUATIONS + CONTINUED_EVALUATIONS
@@ -169,7 +171,7 @@ class StateProposals:
             The states, and the number of small pictures that were evaluated.
 
         """
-        group_count = min(SEARCHED_GROUPS, max(count // (4 * GROUP_POSES), 1))
+        group_count = max(int(SIMILAR_SHARE * count) // GROUP_POSES, 1)
         tried = max(count - group_count * GROUP_POSES, 1)
         known = frame_costs.yaw
         if before is None and known is None:

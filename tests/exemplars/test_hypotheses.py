@@ -4,12 +4,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from posefit import Observation, exchanged_limbs, turned_poses
 from posefit.arrays import Array
 from posefit.fitting.tracker import Task
 from posefit.geometry.skeleton import JOINTS, LIMBS, angles_of
 from posefit.motion import built_in
+from posefit_exemplars import markov
 from posefit_exemplars.cost_model import (
     MAX_PART_COST,
     PARTS,
@@ -18,8 +20,9 @@ from posefit_exemplars.cost_model import (
 from posefit_exemplars.estimate import Estimate
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import Hypotheses
+from posefit_exemplars.markov import mean_near
 from posefit_exemplars.proposals import Counts
-from posefit_exemplars.tracker import ExemplarTracker
+from posefit_exemplars.tracker import MIN_EVALUATIONS, ExemplarTracker
 from tests.cases import each
 from tests.exemplars.conftest import Walk, walk_of
 
@@ -128,6 +131,23 @@ def test_the_right_one_of_two_hypotheses_is_reported_even_where_the_path_is_turn
     )
 
 
+def test_only_one_camera_makes_a_mean_of_similar_hypotheses(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    means = list[int]()
+
+    def counted(row: int, *arguments: Array) -> tuple[Array, Array]:
+        means.append(row)
+        return mean_near(row, *arguments)
+
+    monkeypatch.setattr(markov, "mean_near", counted)
+    for views, count in (((0.0, 90.0), 0), ((0.0,), 3)):
+        means.clear()
+        walk = walk_of(built_in.motion("walk-a", frames=3), views)
+        walk.track(evaluations=MIN_EVALUATIONS, smoothing=0.0)
+        assert len(means) == count
+
+
 def test_what_an_earlier_track_had_is_tried_with_exchanged_and_with_other_limbs() -> (
     None
 ):
@@ -189,7 +209,7 @@ def test_beside_an_earlier_track_clips_count_half_as_much_against_two_views(
     def apart(observation: Observation) -> float:
         totals = follower._joined(
             FrameCosts(walk.task, observation, alone), hypotheses, None, 1.0
-        )[0].totals
+        )[0].paths.totals
         return float(totals[1] - totals[0])
 
     off = follower._exemplars.nearest(poses, 1)[1][:, 0] / 0.05**2
