@@ -92,7 +92,6 @@ FIXED: Mapping[str, Sequence[str]] = {
         "TOTAL_BINS",
     ),
     "they keep numbers finite": ("MAX_KERNEL_COST",),
-    "MIN_SMALL_SIDE chooses among them": ("SMALL_FACTORS",),
     "they name a stream of random numbers": ("RNG_STREAM_TABLE",),
     "arrays on disk are learned with them": (
         "COARSE_GROUPS",

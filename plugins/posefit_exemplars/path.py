@@ -46,11 +46,11 @@ from posefit_exemplars.hypotheses import Hypotheses
 from posefit_exemplars.proposals import (
     BEAM_STATES,
     LIMB_EVALUATIONS,
-    SAME_DISTANCE,
     HypothesisProposals,
     StateProposals,
     next_states,
     poses_of,
+    same_distance,
 )
 
 FULL_SHARE = 0.6  # share of the path's evaluations for costs at full size
@@ -315,17 +315,13 @@ class HypothesisPath:
             states = [frame.states for frame in window]
             estimate, hypotheses, *_ = window[0]
             row = markov.viterbi_state([one.paths for one in states])
+            weights = markov.state_weights(states)
             poses = hypotheses.poses
-            pose = poses[row]
-            place = hypotheses.places[row]
-            # one camera leaves similar poses open, and their mean is nearer to the
-            # truth; several cameras tell them apart
-            if estimate.frame_costs.camera_count == 1:
-                weights = markov.state_weights(states)
-                squares = hypotheses.squares_from(row) / SAME_DISTANCE**2
-                pose, place = markov.mean_near(
-                    row, weights, squares, poses, hypotheses.places
-                )
+            reach = same_distance(estimate.frame_costs.camera_count)
+            squares = hypotheses.squares_from(row) / reach**2
+            pose, place = markov.mean_near(
+                row, weights, squares, poses, hypotheses.places
+            )
             rows = markov.sample_states(states, rows, self._sampling, rng)
             paths = markov.SampledPaths.of(
                 self._task.body.skeleton, poses[rows], hypotheses.places[rows], pose

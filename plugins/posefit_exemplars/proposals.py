@@ -53,9 +53,17 @@ LIMB_POSES = 16  # poses of clips that lend their limbs, for each limb
 LIMB_ROUNDS = 2  # how often each limb is tried
 LIMB_ANGLES = [angles_of(bones) for bones in LIMBS.values()]
 LIMB_EVALUATIONS = LIMB_ROUNDS * len(LIMBS) * (LIMB_POSES + 1.0)
-# Metres. Hypotheses nearer than this continue as one. It is also the standard deviation
-# of the mean that is reported.
-SAME_DISTANCE = 0.03
+SAME_DISTANCE = 0.03  # metres, with one camera: see `same_distance`
+
+
+def same_distance(cameras: int) -> float:
+    """Return the distance, metres, at which hypotheses count as the same pose.
+
+    Nearer ones continue as one. It is also the standard deviation of the mean that is
+    reported. The more cameras show the person, the better they tell similar poses
+    apart.
+    """
+    return SAME_DISTANCE / cameras**2
 
 
 def next_states(exemplars: Exemplars, steps: ClipSteps, count: int) -> Beam:
@@ -318,7 +326,8 @@ class HypothesisProposals:
         count = self.counts(frame_costs).continued
         flat = hypotheses.joints.reshape(len(hypotheses.joints), -1)  # (n, 81)
         joints = flat.astype(np.float32)
-        same = squared_distances(joints, joints) < SAME_DISTANCE**2 * len(JOINTS)
+        reach = same_distance(frame_costs.camera_count)
+        same = squared_distances(joints, joints) < reach**2 * len(JOINTS)
         rows: list[int] = []
         for row in np.argsort(totals, kind="stable"):
             if not same[row, rows].any():

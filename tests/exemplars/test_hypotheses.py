@@ -4,14 +4,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from posefit import Observation, exchanged_limbs, turned_poses
 from posefit.arrays import Array
 from posefit.fitting.tracker import Task
 from posefit.geometry.skeleton import JOINTS, LIMBS, angles_of
 from posefit.motion import built_in
-from posefit_exemplars import markov
+from posefit.silhouette.mask import Silhouette
 from posefit_exemplars.cost_model import (
     MAX_PART_COST,
     PARTS,
@@ -20,9 +19,8 @@ from posefit_exemplars.cost_model import (
 from posefit_exemplars.estimate import Estimate
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import Hypotheses
-from posefit_exemplars.markov import mean_near
 from posefit_exemplars.proposals import Counts
-from posefit_exemplars.tracker import MIN_EVALUATIONS, ExemplarTracker
+from posefit_exemplars.tracker import ExemplarTracker
 from tests.cases import each
 from tests.exemplars.conftest import Walk, walk_of
 
@@ -131,21 +129,27 @@ def test_the_right_one_of_two_hypotheses_is_reported_even_where_the_path_is_turn
     )
 
 
-def test_only_one_camera_makes_a_mean_of_similar_hypotheses(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    means = list[int]()
+def test_fewer_hypotheses_are_the_same_the_more_cameras_there_are() -> None:
+    walk = walk_of(built_in.motion("walk-a", frames=2), (0.0, 90.0))
+    joints = np.zeros((3, len(JOINTS), 3))
+    joints[1] += 0.005 / np.sqrt(3.0)  # half a centimetre from the first
+    joints[2] += 0.02 / np.sqrt(3.0)
+    still = np.zeros((3, 66))
+    hypotheses = Hypotheses(still, still[:, :3], joints, still, still[:, :3], joints)
+    totals = np.array([0.0, 1.0, 2.0])
+    observation = walk.observations[0]
 
-    def counted(row: int, *arguments: Array) -> tuple[Array, Array]:
-        means.append(row)
-        return mean_near(row, *arguments)
+    def continuing(silhouettes: Sequence[Silhouette]) -> list[int]:
+        shown = replace(observation, silhouettes=silhouettes)
+        frame_costs = FrameCosts(walk.task, shown)
+        proposals = ExemplarTracker(walk.task).hypotheses.proposals
+        return proposals.continuing(hypotheses, totals, frame_costs).tolist()
 
-    monkeypatch.setattr(markov, "mean_near", counted)
-    for views, count in (((0.0, 90.0), 0), ((0.0,), 3)):
-        means.clear()
-        walk = walk_of(built_in.motion("walk-a", frames=3), views)
-        walk.track(evaluations=MIN_EVALUATIONS, smoothing=0.0)
-        assert len(means) == count
+    first, second = observation.silhouettes
+    unknown = np.zeros_like(second.valid)
+    hidden = Silhouette.of(np.zeros_like(second.mask), unknown)
+    assert continuing([first, second]) == [0, 2]
+    assert continuing([first, hidden]) == [0]
 
 
 def test_what_an_earlier_track_had_is_tried_with_exchanged_and_with_other_limbs() -> (
