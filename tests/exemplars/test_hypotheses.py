@@ -137,12 +137,13 @@ def test_fewer_hypotheses_are_the_same_the_more_cameras_there_are() -> None:
     still = np.zeros((3, 66))
     hypotheses = Hypotheses(still, still[:, :3], joints, still, still[:, :3], joints)
     totals = np.array([0.0, 1.0, 2.0])
+    task = replace(walk.task, evaluations=BUDGET)
     observation = walk.observations[0]
 
     def continuing(silhouettes: Sequence[Silhouette]) -> list[int]:
         shown = replace(observation, silhouettes=silhouettes)
-        frame_costs = FrameCosts(walk.task, shown)
-        proposals = ExemplarTracker(walk.task).hypotheses.proposals
+        frame_costs = FrameCosts(task, shown)
+        proposals = ExemplarTracker(task).hypotheses.proposals
         return proposals.continuing(hypotheses, totals, frame_costs).tolist()
 
     first, second = observation.silhouettes
