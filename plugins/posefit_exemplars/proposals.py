@@ -90,6 +90,7 @@ def next_states(exemplars: Exemplars, steps: ClipSteps, count: int) -> Beam:
     )
     bins = yaw_bins(steps.yaws)
     cheapest_first = np.argsort(beam.totals, kind="stable")
+    # bin by bin, because a pose may be reached at several yaws, once in each bin
     by_bin: list[tuple[Rows, Rows, Array]] = []
     for number in np.unique(bins):
         rows = cheapest_first[bins[cheapest_first] == number]
