@@ -29,6 +29,7 @@ from posefit_exemplars.beam import Beam
 from posefit_exemplars.exemplars import Codes, Exemplars, Rows, about_vertical
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import Hypotheses
+from posefit_exemplars.lookup import YAW_TOLERANCE
 
 # The path's costs.
 
@@ -41,7 +42,6 @@ ROOT_SPREAD = 0.01
 # silhouette says little about the distance from the camera.
 DEPTH_SPREAD = 0.03
 FAST_TURN_COST = 100.0  # cost of each radian beyond the fastest possible turn
-YAW_TOLERANCE = np.radians(45.0)  # of a known yaw, to either side
 # Cost, over the temperature, of a yaw off by twice the tolerance or more, for a
 # thirtieth of a second.
 WRONG_YAW_COST = 4.0

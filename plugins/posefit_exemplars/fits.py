@@ -24,6 +24,7 @@ from posefit.fitting.contours import (
 from posefit.fitting.tracker import Task
 from posefit_exemplars.exemplars import Exemplars
 from posefit_exemplars.frame_costs import FrameCosts
+from posefit_exemplars.hypotheses import SAME_DISTANCE
 
 # Metres, for each step of a fit. Contours that are farther away count less.
 FRESH_REACHES = ROBUST_SCALES[:8]
@@ -41,9 +42,9 @@ LIBRARY_TURN = np.radians(15.0)
 KNOWN_SHIFT = 0.003
 ALIGNED_SHIFT = 0.05
 # The mean of the nearest poses of clips pulls a hypothesis that continues. A pose gets
-# less weight the farther it is away, compared to the nearest one.
+# less weight the farther it is away, compared to the nearest one: `SAME_DISTANCE` is
+# the standard deviation.
 SIMILAR_POSES = 8
-SIMILAR_SPREAD = 0.03  # metres, standard deviation of these weights
 
 PosesAndPlaces = tuple[Array, Array]  # (n, 66), and (n, 3) metres
 
@@ -143,6 +144,6 @@ class FrameFits:
         """
         pulls = precisions(LIBRARY_TURN / self._noise, np.inf)
         pulls[3] = 0.0  # the yaws of clips are free
-        means = self._exemplars.nearby_mean(poses, SIMILAR_POSES, SIMILAR_SPREAD)
+        means = self._exemplars.nearby_mean(poses, SIMILAR_POSES, SAME_DISTANCE)
         sums = self._weights + pulls
         return poses + (pulls / sums)[3:] * (means - poses), sums

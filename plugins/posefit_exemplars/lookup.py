@@ -48,7 +48,7 @@ TEMPERATURE = 4.0  # divides the costs of candidates
 # Nothing is suggested if the squared distance to the nearest code is larger. 99 % of
 # damaged silhouettes of unknown people are nearer.
 MAX_DISTANCE = 16.0
-YAW_TOLERANCE = np.radians(50.0)  # of a known yaw, to either side
+YAW_TOLERANCE = np.radians(45.0)  # of a known yaw, to either side
 RNG_STREAM_TABLE = 61
 Codes = NDArray[np.float32]  # (n, DIMENSIONS)
 

@@ -42,7 +42,7 @@ from posefit_exemplars.estimate import Estimate
 from posefit_exemplars.exemplars import Exemplars, Rows
 from posefit_exemplars.fits import FrameFits
 from posefit_exemplars.frame_costs import FrameCosts
-from posefit_exemplars.hypotheses import Hypotheses
+from posefit_exemplars.hypotheses import Hypotheses, same_distance
 from posefit_exemplars.proposals import (
     BEAM_STATES,
     LIMB_EVALUATIONS,
@@ -50,7 +50,6 @@ from posefit_exemplars.proposals import (
     StateProposals,
     next_states,
     poses_of,
-    same_distance,
 )
 
 FULL_SHARE = 0.6  # share of the path's evaluations for costs at full size

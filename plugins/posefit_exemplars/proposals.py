@@ -20,7 +20,7 @@ from posefit_exemplars import kernels
 from posefit_exemplars.beam import Beam, diverse_best, joined, yaw_bins
 from posefit_exemplars.cost_model import (
     JUMP_COST,
-    YAW_TOLERANCE,
+    TURN_SPREAD,
     ClipSteps,
     lines_of_sight,
     root_deviation_costs,
@@ -30,12 +30,13 @@ from posefit_exemplars.estimate import Estimate
 from posefit_exemplars.exemplars import Exemplars, Rows
 from posefit_exemplars.fits import CONTINUED_EVALUATIONS, FRESH_EVALUATIONS
 from posefit_exemplars.frame_costs import FrameCosts
-from posefit_exemplars.hypotheses import Hypotheses
-from posefit_exemplars.lookup import YAW_STEP, Lookup
+from posefit_exemplars.hypotheses import Hypotheses, same_distance
+from posefit_exemplars.lookup import YAW_STEP, YAW_TOLERANCE, Lookup
 
-BEAM_STATES = 400  # states that a frame keeps
-# Each candidate is also tried with this turn away from its clip, to either side.
-CANDIDATE_TURN = np.radians(7.0)
+BEAM_STATES = 200  # states that a frame keeps
+# Each candidate is also tried turned away from its clip, to either side, by so many
+# standard deviations of turns.
+CANDIDATE_TURNS = (0.0, -2.0, 2.0)
 # Share of the proposed states for where clips continue. The others are for a search
 # everywhere.
 CONTINUED_SHARE = 0.25
@@ -53,17 +54,6 @@ LIMB_POSES = 16  # poses of clips that lend their limbs, for each limb
 LIMB_ROUNDS = 2  # how often each limb is tried
 LIMB_ANGLES = [angles_of(bones) for bones in LIMBS.values()]
 LIMB_EVALUATIONS = LIMB_ROUNDS * len(LIMBS) * (LIMB_POSES + 1.0)
-SAME_DISTANCE = 0.03  # metres, with one camera: see `same_distance`
-
-
-def same_distance(cameras: int) -> float:
-    """Return the distance, metres, at which hypotheses count as the same pose.
-
-    Nearer ones continue as one. It is also the standard deviation of the mean that is
-    reported. The more cameras show the person, the better they tell similar poses
-    apart.
-    """
-    return SAME_DISTANCE / cameras**2
 
 
 def next_states(exemplars: Exemplars, steps: ClipSteps, count: int) -> Beam:
@@ -98,11 +88,13 @@ def next_states(exemplars: Exemplars, steps: ClipSteps, count: int) -> Beam:
             kernels.cheapest_steps(sources, rows, exemplars.tiles, room, bounds)
         )
     states, parents, totals = (
-        np.tile(np.concatenate(parts), 3) for parts in zip(*by_bin, strict=True)
+        np.tile(np.concatenate(parts), len(CANDIDATE_TURNS))
+        for parts in zip(*by_bin, strict=True)
     )
-    turns = np.repeat([0.0, -CANDIDATE_TURN, CANDIDATE_TURN], len(states) // 3)
-    totals = totals + 0.5 * (turns / steps.step.turn) ** 2
-    reached = Beam(states, steps.yaws[parents] + turns, totals, steps.places[parents])
+    turns = np.repeat(CANDIDATE_TURNS, len(states) // len(CANDIDATE_TURNS))
+    totals = totals + 0.5 * turns**2
+    yaws = steps.yaws[parents] + steps.step.turn * turns
+    reached = Beam(states, yaws, totals, steps.places[parents])
     return reached.rows(diverse_best(exemplars, reached, totals, count))
 
 
@@ -236,7 +228,7 @@ class StateProposals:
         code = self.exemplars.coding.of_poses(np.array([[yaw, 0.0, 0.0, *angles]]))[0]
         # squared distances up to a constant, which does not change their order
         squares = (codes**2).sum(axis=1) - 2.0 * (codes @ code)
-        turns = [-CANDIDATE_TURN, 0.0, CANDIDATE_TURN]
+        turns = TURN_SPREAD * np.array(CANDIDATE_TURNS)
         room = min(count // len(turns), BEAM_STATES)
         nearest = np.argsort(squares, kind="stable")[:room]
         states = np.tile(nearest, len(turns))

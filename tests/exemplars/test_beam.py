@@ -17,7 +17,7 @@ from posefit_exemplars.cost_model import (
 )
 from posefit_exemplars.exemplars import Exemplars, about_vertical
 from posefit_exemplars.proposals import (
-    CANDIDATE_TURN,
+    CANDIDATE_TURNS,
     next_states,
 )
 
@@ -58,7 +58,7 @@ def test_next_states_are_those_of_the_slow_twin(small: Exemplars) -> None:
     twin: dict[tuple[int, int], float] = {}
     for row in range(3):
         for state in range(len(small)):
-            for turn in (-CANDIDATE_TURN, 0.0, CANDIDATE_TURN):
+            for turn in STEP.turn * np.array(CANDIDATE_TURNS):
                 facing = np.array([before.yaws[row] + turned[row] + turn])
                 key = state, int(yaw_bins(facing)[0])
                 twin[key] = min(
@@ -71,7 +71,7 @@ def test_next_states_are_those_of_the_slow_twin(small: Exemplars) -> None:
     for key, total in totals.items():
         assert total == pytest.approx(twin[key], rel=1e-4, abs=1e-3)
     assert min(totals.values()) == pytest.approx(min(twin.values()), abs=1e-3)
-    highest = before.totals.min() + JUMP_COST + 0.5 * (CANDIDATE_TURN / STEP.turn) ** 2
+    highest = before.totals.min() + JUMP_COST + 0.5 * 2.0**2
     assert beams.totals.max() < highest
     for row in range(3):  # the next pose of each clip is among them
         assert (
@@ -79,7 +79,7 @@ def test_next_states_are_those_of_the_slow_twin(small: Exemplars) -> None:
             in beams.states
         )
     expected = before.places + about_vertical(ways, before.yaws)
-    turns = np.array([-CANDIDATE_TURN, 0.0, CANDIDATE_TURN])
+    turns = STEP.turn * np.array(CANDIDATE_TURNS)
     yaws_off = np.abs(
         wrapped(beams.yaws[:, None, None] - (before.yaws + turned)[:, None] - turns)
     )
