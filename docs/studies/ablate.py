@@ -140,7 +140,6 @@ MECHANISMS: Mapping[str, Change] = {
     "poses of clips pull no hypothesis": {"fits.LIBRARY_TURN": OFF},
     "distance from clips costs nothing": {"cost_model.LIBRARY_COST": 0.0},
     "no diverse states": {"beam.BEAM_SHARES": 1},
-    "no limit to the cost of a part's step": {"cost_model.MAX_PART_COST": OFF},
     "masks are never taken for noisy": {"cost_model.CLEAN_COST": OFF},
     "no candidates that turn away": {"proposals.CANDIDATE_TURNS": (0.0,)},
     "roots may be anywhere": {

@@ -15,7 +15,6 @@ measured by docs/studies/ablate.py.
 
 import math
 from collections import deque
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Self
 
@@ -24,9 +23,9 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.tracker import Task
 from posefit.geometry.rotation import wrapped
-from posefit.geometry.skeleton import JOINTS, LIMBS
+from posefit.geometry.skeleton import JOINTS
 from posefit_exemplars.beam import Beam
-from posefit_exemplars.exemplars import Codes, Exemplars, Rows, about_vertical
+from posefit_exemplars.exemplars import Codes, Exemplars, about_vertical
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import Hypotheses
 from posefit_exemplars.lookup import YAW_TOLERANCE
@@ -56,10 +55,6 @@ LIBRARY_DISTANCE = 0.05  # metres
 LIBRARY_COST = 4.0  # for a thirtieth of a second
 # The same in the only frame of a track, where hypotheses are fitted longer.
 ALONE_LIBRARY_COST = 1.0
-_LIMBS = [np.array([JOINTS.index(bone) for bone in bones]) for bones in LIMBS.values()]
-_TRUNK = np.setdiff1d(np.arange(len(JOINTS)), np.concatenate(_LIMBS))
-PARTS: Sequence[Rows] = [_TRUNK, *_LIMBS]  # the joints of each part
-MAX_PART_COST = 4.0  # cost of a step of one part, at most
 # The cost of a pose fitted to clean masks. If even the best frames cost more, masks or
 # the body are less precise.
 CLEAN_COST = 3.0
@@ -266,10 +261,10 @@ class HypothesisCosts:
     ) -> Array:
         """Return the costs (n, m) of steps to the m hypotheses of a frame.
 
-        The distances of the trunk and of each limb from where their motion leads cost
-        something, and so does that of an unknown root.
+        The distances from where the motion of a hypothesis leads cost something: those
+        of its joints, and that of an unknown root.
         """
-        costs = part_step_costs(self._spread, before, after)
+        costs = motion_step_costs(self._spread, before, after)
         if frame_costs.root is None:
             expected = before.places + before.shifts
             sights = lines_of_sight(after.places, frame_costs.camera_position)
@@ -277,13 +272,12 @@ class HypothesisCosts:
         return costs
 
 
-def part_step_costs(spread: float, before: Hypotheses, after: Hypotheses) -> Array:
+def motion_step_costs(spread: float, before: Hypotheses, after: Hypotheses) -> Array:
     """Return the costs (n, m) of steps between hypotheses of successive frames.
 
-    A step costs the sum over the trunk and the limbs. The cost of a part is half the
-    sum of two squares: the distance of its joints from where the mean of both rates
-    leads, and the difference of the rates. Both are in spreads, root mean square over
-    all joints.
+    A cost is half the sum of two squares: the distance of the joints from where the
+    mean of both rates leads, and the difference of the rates. Both are in spreads, root
+    mean square over all joints.
 
     Args:
         spread: Standard deviation of a step, metres.
@@ -291,21 +285,20 @@ def part_step_costs(spread: float, before: Hypotheses, after: Hypotheses) -> Arr
         after: The m hypotheses of the next frame.
 
     """
-    scale = 0.5 / (spread**2 * len(JOINTS))
     # half a frame after the one and half a frame before the other
     expected = before.joints + 0.5 * before.rates
     found = after.joints - 0.5 * after.rates
-    total = np.zeros((len(expected), len(found)))
-    for part in PARTS:
-        # a distance of joints and rates in one vector is the sum of both squares
-        motions = np.concatenate([expected[:, part], before.rates[:, part]], axis=1)
-        others = np.concatenate([found[:, part], after.rates[:, part]], axis=1)
-        squares = squared_distances(
-            motions.reshape(len(motions), -1).astype(np.float32),
-            others.reshape(len(others), -1).astype(np.float32),
-        )
-        total += np.minimum(scale * squares, MAX_PART_COST)
-    return total
+    # a distance of joints and rates in one vector is the sum of both squares
+    squares = squared_distances(
+        _motions(expected, before.rates), _motions(found, after.rates)
+    )
+    return np.asarray(squares / (2.0 * spread**2 * len(JOINTS)), dtype=np.float64)
+
+
+def _motions(joints: Array, rates: Array) -> Codes:
+    """Return joints (n, 27, 3) and rates (n, 27, 3) as vectors (n, 162)."""
+    both = np.concatenate([joints, rates], axis=1)
+    return both.reshape(len(both), -1).astype(np.float32)
 
 
 class MaskNoise:

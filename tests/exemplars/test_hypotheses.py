@@ -12,9 +12,7 @@ from posefit.geometry.skeleton import JOINTS, LIMBS, angles_of
 from posefit.motion import built_in
 from posefit.silhouette.mask import Silhouette
 from posefit_exemplars.cost_model import (
-    MAX_PART_COST,
-    PARTS,
-    part_step_costs,
+    motion_step_costs,
 )
 from posefit_exemplars.estimate import Estimate
 from posefit_exemplars.frame_costs import FrameCosts
@@ -38,14 +36,10 @@ def single(code: float, rate: float, joint: str = "lwrist") -> Hypotheses:
     return Hypotheses(still, nothing, joints, still, nothing, rates)
 
 
-def test_every_joint_is_in_one_part() -> None:
-    assert sorted(np.concatenate(PARTS)) == list(range(len(JOINTS)))
-
-
 def test_what_steps_cost_by_hand() -> None:
     def cost(code: float, rate: float, later: float, later_rate: float) -> float:
         return float(
-            part_step_costs(0.03, single(code, rate), single(later, later_rate))[0, 0]
+            motion_step_costs(0.03, single(code, rate), single(later, later_rate))[0, 0]
         )
 
     # it goes on as it does
@@ -55,11 +49,6 @@ def test_what_steps_cost_by_hand() -> None:
     np.testing.assert_allclose(cost(0.0, 0.06, 0.09, 0.06), 0.5, atol=1e-5)
     # at rest, then at a spread's rate: 0.015 off and the rates a spread apart
     np.testing.assert_allclose(cost(0.0, 0.0, 0.0, 0.03), 1 / 8 + 1 / 2, atol=1e-5)
-    assert cost(0.0, 0.0, 1.0, 0.0) == MAX_PART_COST
-    both = single(1.0, 0.0)  # two parts that are far off cost twice as much as one
-    both.joints[0, JOINTS.index("rfoot"), 1] = 9.0
-    twice = part_step_costs(0.03, single(0.0, 0.0), both)[0, 0]
-    assert float(twice) == 2.0 * MAX_PART_COST
 
 
 def test_legs_of_one_clip_go_with_the_arms_of_another() -> None:
