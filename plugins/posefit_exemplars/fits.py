@@ -36,7 +36,7 @@ FRESH_EVALUATIONS = len(FRESH_REACHES) * STEP_EVALUATIONS + 1.0
 # Two of the evaluations compare the places to start at.
 CONTINUED_EVALUATIONS = len(CONTINUED_REACHES) * STEP_EVALUATIONS + 3.0
 # Standard deviations of an angle from the start of a fit, and from similar clips.
-START_TURN = np.radians(8.0)
+START_TURN = np.radians(16.0)
 LIBRARY_TURN = np.radians(15.0)
 # Standard deviations of the root from its start, metres.
 KNOWN_SHIFT = 0.003
