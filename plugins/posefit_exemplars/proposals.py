@@ -49,7 +49,6 @@ GROUP_POSES = 20
 MIN_FIT_EVALUATIONS = 2 * FRESH_EVALUATIONS + CONTINUED_EVALUATIONS
 FRESH_SHARE = 0.45  # share of the evaluations for fresh hypotheses
 REFLECTED_SHARE = 0.25  # share of reflections among the fresh hypotheses
-ALONE_REFLECTED_SHARE = 0.5  # the same in the only frame of a track
 LIMB_POSES = 16  # poses of clips that lend their limbs, for each limb
 LIMB_ROUNDS = 2  # how often each limb is tried
 LIMB_ANGLES = [angles_of(bones) for bones in LIMBS.values()]
@@ -298,11 +297,11 @@ class HypothesisProposals:
         evaluations = max(evaluations, MIN_FIT_EVALUATIONS)
         if frame_costs.alone:
             fresh = race_count(evaluations)
-            return Counts(fresh, fresh - 1 - int(ALONE_REFLECTED_SHARE * fresh), 0)
-        fresh = max(int(FRESH_SHARE * evaluations / FRESH_EVALUATIONS), 2)
-        continued = int(
-            (evaluations - fresh * FRESH_EVALUATIONS) / CONTINUED_EVALUATIONS
-        )
+            continued = 0
+        else:
+            fresh = max(int(FRESH_SHARE * evaluations / FRESH_EVALUATIONS), 2)
+            rest = evaluations - fresh * FRESH_EVALUATIONS
+            continued = int(rest / CONTINUED_EVALUATIONS)
         return Counts(fresh, fresh - 1 - int(REFLECTED_SHARE * fresh), continued)
 
     def continuing(
