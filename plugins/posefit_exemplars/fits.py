@@ -79,7 +79,9 @@ class FrameFits:
         self._contours: list[MaskContours] = frame_costs.contours(place)
         self._noise = noise
         shift = ALIGNED_SHIFT if frame_costs.root is None else KNOWN_SHIFT
-        self._weights = precisions(START_TURN / noise, shift)  # (69,)
+        # noisy masks say less, and so the start more: twice as much from the first on
+        turn = START_TURN / (2.0 * noise - 1.0)
+        self._weights = precisions(turn, shift)  # (69,)
         self.evaluations = 0.0
 
     def fresh(self, start: PosesAndPlaces) -> PosesAndPlaces:
