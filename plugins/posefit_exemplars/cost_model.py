@@ -25,9 +25,10 @@ from posefit.fitting.tracker import Task
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import JOINTS
 from posefit_exemplars.beam import Beam
-from posefit_exemplars.exemplars import Codes, Exemplars, about_vertical
+from posefit_exemplars.exemplars import Exemplars, about_vertical
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import Hypotheses
+from posefit_exemplars.kernels import Codes
 from posefit_exemplars.lookup import YAW_TOLERANCE
 
 # The path's costs.
@@ -138,20 +139,20 @@ class ClipSteps:
         codes = exemplars.codes[after.states]
         squares = squared_distances(self.codes, codes)
         # TOYAMA2001 (dynamics)
-        costs: Array = squares / (2.0 * step.pose**2)
+        pose_costs = squares / np.float32(2.0 * step.pose**2)
         # Most steps cost more than a jump by their poses alone, and need no more. Flat
         # indices of the others take a tenth of the time of a mask.
-        near = np.flatnonzero(costs < JUMP_COST)
+        near = np.flatnonzero(pose_costs < JUMP_COST)
         rows, columns = np.divmod(near, len(after))
         turns = wrapped(after.yaws[columns] - self.yaws[rows])
-        cheap = costs.take(near) + 0.5 * (turns / step.turn) ** 2
+        cheap = pose_costs.take(near) + 0.5 * (turns / step.turn) ** 2
         if aligned:
             missed = after.places.take(columns, 0) - self.places.take(rows, 0)
             sights = lines_of_sight(after.places, camera)
             if sights is not None:
                 sights = sights.take(columns, 0)
             cheap += root_deviation_costs(missed, sights)
-        costs = np.full(costs.shape, JUMP_COST)
+        costs = np.full(pose_costs.shape, JUMP_COST)
         costs.ravel()[near] = np.minimum(cheap, JUMP_COST)
         if step.max_turn < np.pi:
             turned = np.abs(wrapped(after.yaws - self.beam.yaws[:, None]))

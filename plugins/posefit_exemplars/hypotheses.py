@@ -8,7 +8,7 @@ from posefit.arrays import Array
 from posefit.fitting.tracker import Task
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES, JOINTS, root_centred
-from posefit_exemplars.exemplars import Rows
+from posefit_exemplars.kernels import Rows
 
 # Metres, the standard deviation of the joints of poses that count as the same, with one
 # camera: see `same_distance`.

@@ -29,8 +29,9 @@ from posefit.silhouette.cost import masks_of
 from posefit.silhouette.drawn import uncounted
 from posefit.silhouette.mask import Mask, Silhouette, box_of, without_small_pieces
 from posefit.uncertainty.modes import Posterior
-from posefit_exemplars.exemplars import Exemplars, Rows, exemplars_for
+from posefit_exemplars.exemplars import Exemplars, exemplars_for
 from posefit_exemplars.frame_costs import FrameCosts
+from posefit_exemplars.kernels import Rows
 
 POSES = 2000  # poses in a table, drawn by `Exemplars.draw`
 YAWS = 24  # yaws that each pose is turned to

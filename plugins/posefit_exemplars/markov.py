@@ -18,7 +18,7 @@ from posefit.arrays import Array
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton, joint_distances
 from posefit.uncertainty.modes import Posterior
-from posefit_exemplars.exemplars import Rows
+from posefit_exemplars.kernels import Rows
 
 # Metres, root mean square over joints. Samples nearer to the reported pose than this
 # belong to its mode.

@@ -39,10 +39,11 @@ from posefit_exemplars.cost_model import (
     yaw_costs,
 )
 from posefit_exemplars.estimate import Estimate
-from posefit_exemplars.exemplars import Exemplars, Rows
+from posefit_exemplars.exemplars import Exemplars
 from posefit_exemplars.fits import FrameFits
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import Hypotheses, same_distance
+from posefit_exemplars.kernels import Rows
 from posefit_exemplars.proposals import (
     BEAM_STATES,
     LIMB_EVALUATIONS,

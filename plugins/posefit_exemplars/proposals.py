@@ -27,10 +27,11 @@ from posefit_exemplars.cost_model import (
     squared_distances,
 )
 from posefit_exemplars.estimate import Estimate
-from posefit_exemplars.exemplars import Exemplars, Rows
+from posefit_exemplars.exemplars import Exemplars
 from posefit_exemplars.fits import CONTINUED_EVALUATIONS, FRESH_EVALUATIONS
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import Hypotheses, same_distance
+from posefit_exemplars.kernels import Rows
 from posefit_exemplars.lookup import YAW_STEP, YAW_TOLERANCE, Lookup
 
 BEAM_STATES = 200  # states that a frame keeps
