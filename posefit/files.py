@@ -14,6 +14,7 @@ import secrets
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
+from functools import partial
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, Self
@@ -101,14 +102,7 @@ def replaced_file(path: str | Path, mark: bytes) -> AbstractContextManager[Path]
         InputError: something else has the name, or it cannot be written; the disk may
             be full.
     """
-
-    def check(target: Path) -> None:
-        if not replaceable(target, mark):
-            raise InputError(
-                f"{target}: expected a new name or an earlier file of this kind, "
-                "got something else"
-            )
-
+    check = partial(check_replaceable, mark=mark)
     return _built(Path(path), check, _created, Path.replace)
 
 
@@ -141,18 +135,22 @@ def _built(
         ) from error
 
 
-def replaceable(path: str | Path, mark: bytes) -> bool:
-    """Return whether a name is free, or names a file that begins with `mark`.
+def check_replaceable(path: str | Path, mark: bytes) -> None:
+    """Raise InputError if `path` exists and is not a file that begins with `mark`.
 
     A link is never replaceable.
     """
     target = Path(path)
     if not os.path.lexists(target):
-        return True
-    if target.is_symlink() or not target.is_file():
-        return False
-    with target.open("rb") as file:
-        return file.read(len(mark)) == mark
+        return
+    if target.is_file() and not target.is_symlink():
+        with target.open("rb") as file:
+            if file.read(len(mark)) == mark:
+                return
+    raise InputError(
+        f"{target}: expected a new name or an earlier file of this kind, "
+        "got something else"
+    )
 
 
 class Unfinished:

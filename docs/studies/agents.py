@@ -3,37 +3,38 @@
     python docs/studies/agents.py --rows agents.jsonl --picture agents.png
 
 All are tested on held-out instances. A learner's row is one training: of
-Stable-Baselines3's PPO, or on the truths of training instances. A search's row has
-every instance once. There is a table for each level.
+Stable-Baselines3's PPO, on the answers to silhouettes, or on these first. A search's
+row has every instance once. There is a table for each level.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
+from pathlib import Path
 from time import process_time
 from typing import Any, NamedTuple
 
 import click
 import gymnasium as gym
 import numpy as np
-from gymnasium.wrappers.vector import ResizeObservation, TransformObservation
 
+from pose_network import teach
 from posefit import Problem, minimise
 from posefit.arrays import Array
 from posefit.cli.output import Command
 from posefit.errors import InputError
-from posefit.fitting.box import Space, Start
+from posefit.fitting.box import Space
 from posefit.registry import registry
 from posefit.settings import planned
-from posefit_envs import to_sb3_vec_env
+from posefit_envs import Corrections, to_sb3_vec_env
+from posefit_envs.corrections import shrunk
 from posefit_envs.fit import MAX_EVALUATIONS
 from table import WORKERS, drawn_means, keyed, markdown, measured, quantiles
 
 HELD_OUT = 10_000  # the first instance of the test split
 INSTANCES = 200
-SEEDS = 3
-STEPS = 270_000
+SEEDS = 5
+STEPS = 240_000
 TESTED = list(range(HELD_OUT, HELD_OUT + INSTANCES))
 LEVELS = {
     "easy": "FitImage-easy-v1",
@@ -49,31 +50,39 @@ LOOK_UP = "look-up"
 CONSTANTS = ("uniform", "the truth, projected", LOOK_UP)
 LOOKED_UP = 10_000  # training instances
 LOOKED_UP_AT_ONCE = 500
-# taught on silhouettes that the environment draws; see pose_network.py
+# taught on the answers to training silhouettes, or to silhouettes that are drawn; see
+# pose_network.py
+CLONING = "cloning"
 POSING = "pose network"
-POSING_STEPS = 240_000
-POSING_ENVIRONMENTS = 256
-LEARNERS = ("PPO, blank", "cloning", "PPO", "cloning, then PPO", POSING)
-# CMA-ES, started from the best of PPO's proposals
-STARTED = "PPO, then cma"
-STARTED_BUDGET = 200
-STARTED_SPREAD = 0.1
+DRAWN = {CLONING: 0.0, POSING: 0.7}  # share of drawn silhouettes
+TAUGHT_STEPS = 240_000
+TEACHERS = 256  # environments
+# PPO, and PPO that goes on from a pose network
+CONTINUED = "pose network, then PPO"
+LEARNERS = (CLONING, "PPO", POSING, CONTINUED)
 ENVIRONMENTS = 64
 ROLLOUT = 16
 BATCH = 256
 EPOCHS = 6
 LEARNING_RATE = 1.5e-3
 LOG_DEVIATION = -1.6
-SHOWN = (12, 16)  # height and width of the networks' pictures
+SHOWN = (12, 16)  # height and width of small pictures, where nothing is corrected
 NETWORKS: dict[str, list[int]] = {"pi": [384, 128], "vf": [128]}  # hidden layers
-# steps of cloning before PPO continues, and the narrower deviation with which it does
-CLONING_STEPS = 30_720
-CLONED_LOG_DEVIATION = -2.3
-LEARNING = {"cloning": CLONING_STEPS, POSING: POSING_STEPS}
+# gentler steps of a taught network, after its estimates of rewards are learned
+CONTINUED_STEPS = 100_000
+CONTINUED_RATE = 3e-4
+CONTINUED_LOG_DEVIATION = -2.5
+VALUE_STEPS = 8_192
+VALUE_PASSES = 10
+LEARNING = {
+    CLONING: TAUGHT_STEPS,
+    POSING: TAUGHT_STEPS,
+    CONTINUED: TAUGHT_STEPS + CONTINUED_STEPS,
+}
 WHITE = (255, 255, 255)
 
-# of small pictures (n, 12, 16, 2 views), and the costs (n,) of the last proposals
-Policy = Callable[[Any, Array], Array]
+# actions (n, d) in an environment of observations (n, ...)
+Policy = Callable[[Any], Array]
 
 
 class Training(NamedTuple):
@@ -100,46 +109,51 @@ def name_of(level: str) -> str:
 
 
 def made(training: Training, count: int, **arguments: Any) -> Any:
-    """Return a vector environment of a level with small pictures.
+    """Return a vector environment of a level."""
+    return gym.make_vec(name_of(training.level), count, **arguments)
 
-    For a blank agent the observed silhouettes are blank.
+
+def tested(training: Training, proposals: int) -> Any:
+    """Return the vector environment that an agent is tested in.
+
+    Learners correct proposals; others propose.
     """
-    env = ResizeObservation(
-        gym.make_vec(name_of(training.level), count, **arguments), SHOWN
-    )
-    channels = np.arange(env.single_observation_space.shape[-1])
-    channels_shown = np.ones_like(channels)
-    if "blank" in training.agent:
-        channels_shown = channels % 2
-    mask = channels_shown.astype(np.uint8)
-    return TransformObservation(env, lambda pictures: pictures * mask)
-
-
-def episodes(policy: Policy, training: Training, proposals: int) -> tuple[Array, Array]:
-    """Return actions (k, n, d) and costs (k, n) of an episode on each test instance."""
     env = made(training, INSTANCES, split="test", max_evaluations=proposals)
-    pictures, infos = env.reset(seed=0, options={"instance": TESTED})
-    actions = []
+    return Corrections(env) if training.agent in LEARNERS else env
+
+
+def episodes(policy: Policy, training: Training, count: int) -> tuple[Array, Array]:
+    """Return proposals (k, n, d) and costs (k, n) of an episode on each instance."""
+    env = tested(training, count)
+    observations, _ = env.reset(seed=0, options={"instance": TESTED})
+    proposals = []
     costs = []
-    for _ in range(proposals):
-        actions.append(np.clip(policy(pictures, infos["cost"]), -1.0, 1.0))
-        pictures, _, _, _, infos = env.step(actions[-1])
+    for _ in range(count):
+        actions = np.clip(policy(observations), -1.0, 1.0)
+        corrects = isinstance(env, Corrections)
+        proposals.append(env.proposals(actions) if corrects else actions)
+        observations, _, _, _, infos = env.step(actions)
         costs.append(infos["cost"])
-    return np.array(actions), np.array(costs)
+    return np.array(proposals), np.array(costs)
 
 
-def row_of(
-    training: Training, start: Mapping[str, Any] | None = None
-) -> dict[str, Any]:
-    """Return a row: best costs on held-out instances, proposals, CPU seconds."""
+def row_of(training: Training, policies: str | None) -> dict[str, Any]:
+    """Return a row: best costs on held-out instances, proposals, CPU seconds.
+
+    What a learner has learned is saved in the folder `policies`, if any.
+    """
     start_time = process_time()
     row = training._asdict()
-    if training.agent in (*SEARCHES, STARTED):
-        row["costs"] = searched(training, start)
+    if training.agent in SEARCHES:
+        row["costs"] = searched(training)
         return row | {"cpu_seconds": round(process_time() - start_time, 1)}
     learns = training.agent in LEARNERS
     if learns:
-        policy = trained(training)
+        model = trained(training)
+        policy = policy_of(model)
+        if policies is not None:
+            name = f"{training.level}-{training.agent}-{training.seed}.npz"
+            np.savez_compressed(Path(policies) / name, *layers_of(model))
     elif training.agent == LOOK_UP:
         policy = looked_up(training)
     else:
@@ -147,11 +161,11 @@ def row_of(
     row["cpu_seconds"] = round(process_time() - start_time, 1)
     several = learns or training.agent in ("uniform", LOOK_UP)
     count = MAX_EVALUATIONS if several else 1
-    actions, costs = episodes(policy, training, count)
+    proposals, costs = episodes(policy, training, count)
     row["costs"] = costs.min(axis=0).tolist()
     if learns:
         row |= {
-            "proposals": actions.round(4).tolist(),
+            "proposals": proposals.round(4).tolist(),
             "proposal_costs": costs.round(2).tolist(),
         }
     return row
@@ -162,10 +176,10 @@ def constant(training: Training) -> Policy:
     rng = np.random.default_rng(training.seed)
     env = made(training, INSTANCES, split="test")
     if training.agent == "uniform":
-        return lambda *_: rng.uniform(-1.0, 1.0, env.action_space.shape)
+        return lambda _: rng.uniform(-1.0, 1.0, env.action_space.shape)
     env.reset(options={"instance": TESTED})
     truths = np.array([problem.truth for problem in env.unwrapped.problems])
-    return lambda *_: truths
+    return lambda _: truths
 
 
 def looked_up(training: Training) -> Policy:
@@ -176,15 +190,15 @@ def looked_up(training: Training) -> Policy:
     for first in range(0, LOOKED_UP, LOOKED_UP_AT_ONCE):
         numbers = list(range(first, first + LOOKED_UP_AT_ONCE))
         pictures, _ = env.reset(options={"instance": numbers})
-        silhouettes.append(observed(pictures))
+        silhouettes.append(shrunk(pictures[..., ::2]))
         truths.append([problem.truth for problem in env.unwrapped.problems])
     known = np.concatenate(silhouettes)
     answers = np.concatenate(truths)
     asked = 0
 
-    def policy(pictures: Any, _: Array) -> Array:
+    def policy(pictures: Any) -> Array:
         nonlocal asked
-        seen = observed(pictures)
+        seen = shrunk(pictures[..., ::2])
         squares = (seen**2).sum(axis=1)[:, None] - 2.0 * seen @ known.T
         squares += (known**2).sum(axis=1)
         nearest = np.argpartition(squares, asked, axis=1)[:, asked]
@@ -194,37 +208,16 @@ def looked_up(training: Training) -> Policy:
     return policy
 
 
-def observed(pictures: Any) -> Array:
-    """Return the observed silhouettes (n, p) of small pictures, of 0 to 1."""
-    return np.asarray(pictures[..., ::2].reshape(len(pictures), -1) / 255.0)
-
-
-def searched(training: Training, start: Mapping[str, Any] | None) -> list[float]:
-    """Return the costs that an optimiser reaches on the held-out instances.
-
-    It searches blindly, or from the proposals of the row `start`.
-    """
-    name = "cma" if training.agent == STARTED else training.agent
+def searched(training: Training) -> list[float]:
+    """Return the costs that an optimiser reaches blindly on the held-out instances."""
     env = made(training, INSTANCES, split="test")
-    costs = []
     env.reset(options={"instance": TESTED})
+    costs = []
     for number, problem in enumerate(env.unwrapped.problems):
-        space = problem.space
-        if start is not None:
-            best = int(np.argmin(np.array(start["proposal_costs"])[:, number]))
-            mean = np.array(start["proposals"])[best, number]
-            space = replace(
-                space,
-                start=Start(
-                    mean, np.full(len(mean), STARTED_SPREAD), np.zeros(len(mean))
-                ),
-            )
-        costs.append(
-            minimum(
-                problem, space, name, training.budget, [training.seed, number]
-            ).best_cost
-        )
-    return costs if start is None else np.minimum(costs, start["costs"]).tolist()
+        seed = [training.seed, number]
+        found = minimum(problem, problem.space, training.agent, training.budget, seed)
+        costs.append(found.best_cost)
+    return costs
 
 
 def minimum(
@@ -243,7 +236,7 @@ def minimum(
     return minimise(searched, optimiser, budget_known=True)
 
 
-def ppo(vector: Any, seed: int) -> Any:
+def ppo(vector: Any, seed: int, rate: float = LEARNING_RATE) -> Any:
     """Return the untrained learner of a vector environment for Stable-Baselines3."""
     import torch
     from stable_baselines3 import PPO
@@ -256,66 +249,84 @@ def ppo(vector: Any, seed: int) -> Any:
     }
     return PPO(
         "MlpPolicy", vector, seed=seed, device="cpu", gamma=0.0,
-        learning_rate=lambda left: LEARNING_RATE * left,
+        learning_rate=lambda left: rate * left,
         n_steps=ROLLOUT, batch_size=BATCH, n_epochs=EPOCHS,
         policy_kwargs=policy_settings,
     )  # fmt: skip
 
 
-def trained(training: Training) -> Policy:
-    """Return the policy of a learner, the mean of its distribution."""
-    if training.agent == POSING:
-        from pose_network import PoseNetwork
+def trained(training: Training) -> Any:
+    """Return the model of a learner after its training."""
+    import torch
 
-        endless: dict[str, Any] = {"max_evaluations": 10**9}
-        env = made(training, POSING_ENVIRONMENTS, **endless)
-        network = PoseNetwork(env, training.seed)
-        network.learn(training.budget)
-        return network.policy()
-    model = ppo(
-        to_sb3_vec_env(made(training, ENVIRONMENTS, errors=False)), training.seed
+    env = Corrections(made(training, ENVIRONMENTS, errors=False))
+    continued = training.agent == CONTINUED
+    rate = CONTINUED_RATE if continued else LEARNING_RATE
+    model = ppo(to_sb3_vec_env(env), training.seed, rate)
+    left = training.budget
+    if training.agent in (CLONING, POSING, CONTINUED):
+        layers = model.policy.mlp_extractor.policy_net
+        network = torch.nn.Sequential(*layers, model.policy.action_net)
+        endless = made(training, TEACHERS, max_evaluations=10**9)
+        drawn = DRAWN.get(training.agent, DRAWN[POSING])
+        teach(network, endless, training.seed, TAUGHT_STEPS, drawn)
+        left -= TAUGHT_STEPS
+    if continued:
+        model.policy.log_std.data.fill_(CONTINUED_LOG_DEVIATION)
+        know_rewards(model, env)
+    if left:
+        model.learn(left)
+    return model
+
+
+def policy_of(model: Any) -> Policy:
+    """Return the policy of a model, the mean of its distribution."""
+    return lambda observations: np.asarray(
+        model.predict(observations, deterministic=True)[0], dtype=np.float64
     )
-    learning = training.budget
-    if "cloning" in training.agent:
-        cloned(model, made(training, ENVIRONMENTS))
-        model.policy.log_std.data.fill_(CLONED_LOG_DEVIATION)
-        learning -= CLONING_STEPS
-    if learning:
-        model.learn(learning)
-    return lambda pictures, _: np.asarray(
-        model.predict(pictures, deterministic=True)[0], dtype=np.float64
-    )
 
 
-def cloned(model: Any, env: Any) -> None:
-    """Teach a model the truths of the observations that its own proposals lead to.
+def layers_of(model: Any) -> list[Array]:
+    """Return weights (inputs, outputs) and biases of a policy's layers, in turn.
 
-    DAgger: Ross, Gordon, Bagnell, AISTATS 2011.
+    They are rounded to 16 bits, as `posefit_envs.trained_policy` reads them.
+    """
+    policy = model.policy
+    arrays = []
+    for layer in (*policy.mlp_extractor.policy_net, policy.action_net):
+        if hasattr(layer, "weight"):
+            arrays.append(layer.weight.detach().numpy().T.astype(np.float16))
+            arrays.append(layer.bias.detach().numpy().astype(np.float16))
+    return arrays
+
+
+def know_rewards(model: Any, env: Any) -> None:
+    """Teach a model the rewards of its actions, and leave its actions as they are.
+
+    PPO compares rewards with what it expects. While that is wrong, it would change a
+    good policy for the worse.
     """
     import torch
 
-    pictures, infos = env.reset(seed=model.seed)
-    length = ROLLOUT * ENVIRONMENTS
-    for _ in range(CLONING_STEPS // length):
-        shown = []
-        targets = []
-        for _ in range(ROLLOUT):
-            shown.append(pictures)
-            targets.append(infos["truth"])
-            pictures, _, _, _, infos = env.step(
-                np.clip(model.predict(shown[-1])[0], -1.0, 1.0)
-            )
-        inputs = model.policy.obs_to_tensor(np.concatenate(shown))[0]
-        answers = torch.as_tensor(np.concatenate(targets), dtype=torch.float32)
-        for rows in [
-            part
-            for _ in range(EPOCHS)
-            for part in torch.split(torch.randperm(length), BATCH)
-        ]:
-            means = model.policy.get_distribution(inputs[rows]).distribution.mean
-            model.policy.optimizer.zero_grad()
-            (means - answers[rows]).square().sum(dim=1).mean().backward()
-            model.policy.optimizer.step()
+    shown = []
+    rewards = []
+    observations, _ = env.reset(seed=model.seed)
+    for _ in range(VALUE_STEPS // ENVIRONMENTS):
+        shown.append(observations)
+        actions, _ = model.predict(observations)
+        observations, reward, _, _, _ = env.step(actions)
+        rewards.append(reward)
+    inputs = torch.from_numpy(np.concatenate(shown))
+    answers = torch.as_tensor(np.concatenate(rewards), dtype=torch.float32)
+    policy = model.policy
+    values = torch.nn.Sequential(*policy.mlp_extractor.value_net, policy.value_net)
+    optimiser = torch.optim.Adam(values.parameters(), 1e-3)
+    for _ in range(VALUE_PASSES):
+        for rows in torch.split(torch.randperm(len(inputs)), BATCH):
+            off = values(inputs[rows])[:, 0] - answers[rows]
+            optimiser.zero_grad()
+            off.square().mean().backward()
+            optimiser.step()
 
 
 def table(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
@@ -342,9 +353,7 @@ def table(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
             continue
         ((budget, group),) = budgets.items()
         costs = np.array([row["costs"] for row in group])
-        proposals = {STARTED: f"8 + {budget}", "uniform": "8", LOOK_UP: "8"}.get(
-            agent, "8" if agent in LEARNERS else "1"
-        )
+        proposals = "8" if agent in (*LEARNERS, "uniform", LOOK_UP) else "1"
         steps = f"{budget:,}"
         cpu = f"{np.mean([row['cpu_seconds'] for row in group]):.0f}"
         training = [steps, cpu, str(len(group))] if agent in LEARNERS else ["", "", ""]
@@ -448,6 +457,12 @@ def picture(row: Mapping[str, Any], path: str) -> None:
     metavar="FILE",
     help="PNG to write: eight proposals of the first pose network.",
 )
+@click.option(
+    "--policies",
+    metavar="DIR",
+    type=click.Path(exists=True, file_okay=False),
+    help="Folder for what learners have learned: a file for each row.",
+)
 @WORKERS
 def main(
     names: tuple[str, ...],
@@ -455,6 +470,7 @@ def main(
     seeds: int,
     rows: str | None,
     drawn: str | None,
+    policies: str | None,
     workers: int | None,
 ) -> None:
     check_learners()
@@ -474,12 +490,11 @@ def main(
             for name in agents or LEARNERS
         ]
     done = measured(
-        {turn: partial(row_of, turn) for turn in turns}, rows, keyed(Training), workers
+        {turn: partial(row_of, turn, policies) for turn in turns},
+        rows,
+        keyed(Training),
+        workers,
     )
-    for turn in turns:
-        if turn.agent == "PPO":
-            started = Training(turn.level, STARTED, STARTED_BUDGET, turn.seed)
-            done[started] = row_of(started, done[turn])
     for level in names or ("default",):
         click.echo(f"\n{level}, {INSTANCES} held-out instances\n")
         for line in table([row for turn, row in done.items() if turn.level == level]):

@@ -22,7 +22,6 @@ from agents import (
     HELD_OUT,
     SEARCHES,
     SHOWN,
-    STEPS,
     check_learners,
     minimum,
     ppo,
@@ -40,6 +39,7 @@ NAME = "posefit_envs:posefit/Track-v1"
 PEOPLE: dict[str, Any] = {"held_out_people": False}
 STACKED = 4  # number of latest pictures that the agent sees
 BUDGETS = (8, 40, 100, 200)  # evaluations per frame of blind searches
+STEPS = 270_000
 SEEDS = 2
 INSTANCES = 100
 TESTED = list(range(HELD_OUT, HELD_OUT + INSTANCES))

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.footage.video import Video, VideoWriter
+from posefit.footage.video import Video
+from posefit.footage.writing import VideoWriter
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
@@ -178,9 +179,7 @@ def _empty(path: str) -> tuple[NDArray[np.float32], list[NDArray[np.int8]]]:
     """
     video = check_video(path)
     frames = {
-        k: image
-        for k, image in enumerate(video.frames(0, None, FILMED))
-        if k in EMPTY or k < LIVING
+        k: image for k, image in enumerate(video.frames()) if k in EMPTY or k < LIVING
     }
     half = len(EMPTY) // 2  # an odd number of frames: the median is one of them
     still = np.partition([frames[k] for k in EMPTY], half, axis=0)[half].astype(

@@ -32,9 +32,9 @@ from posefit.errors import InputError
 from posefit.files import new_folder
 from posefit.fitting import metrics
 from posefit.fitting.tracker import Frame
+from posefit.footage.agreement import extent_of
 from posefit.footage.extraction import Extraction
 from posefit.footage.options import SourceOptions
-from posefit.footage.quality import extent_of
 from posefit.footage.scene import Scene
 from posefit.footage.source import scene_of
 from posefit.footage.video import Video

@@ -11,19 +11,27 @@ memory is that of the work alone. A size that is in the file is not measured aga
 `table` prints a line a row. Its exponent p is of the fit `a + b n^p`, where a is what
 starting takes. Sizes that were not reached are extrapolated in proportion.
 
+`look` opens a page in headless Chromium, and prints the time to its first picture and
+the memory of the browser.
+
+`cluster` runs cells that sleep on Dask workers of this machine, and prints the share of
+the workers' time in which cells ran.
+
 `pose` prints the microseconds of a pose by picture, views, dimensions and population:
 the benchmark's problem with one number changed, in the fastest run on one thread.
 """
 
+import importlib
 import json
 import os
 import resource
 import select
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -41,15 +49,17 @@ FPS = 30.0
 FILM_SIZE = (320, 240)  # width and height of most films
 # of a method that is cheap, so that what surrounds a search shows
 CHEAP: dict[str, Any] = {"method": "sapso@pca", "evaluations": 40}
+KNOWN_FRAMES = (0, 120)
 STREAM_FPS = 100.0
 ENVIRONMENT = "posefit_envs:posefit/FitImage-v1"
-ENVIRONMENT_STEPS = 64
+ENVIRONMENT_STEPS = 256
 STEPPED_ENVIRONMENTS = 4096
 FITTED_SIZES = 4  # of a fit, at least
 FLAT = 0.05  # what grows by less than this share is flat
 # a report compares this many methods
 METHODS = 10
 POSES = 400
+PORT = 8786  # of a Dask scheduler
 WIDTHS = (80, 160, 320, 640, 1280)
 VIEWS = (1, 2, 4, 8)
 COMPONENTS = (3, 6, 12, 24, 48)
@@ -127,12 +137,11 @@ def track_stream(frames: int, folder: Path) -> None:
 def track_known(
     options: Callable[[int], Mapping[str, Any]], size: int, folder: Path
 ) -> None:
-    """Track a known motion of twelve frames, and write every file."""
+    """Track a known motion of some seconds, and write every file."""
     import posefit
 
-    posefit.track(
-        "walk", frames=(0, 12), out=folder / "track", **CHEAP, **options(size)
-    )
+    how = {"method": CHEAP["method"], "frames": KNOWN_FRAMES, **options(size)}
+    posefit.track("walk", out=folder / "track", **how)
 
 
 def cameras_around(cameras: int) -> dict[str, Any]:
@@ -155,11 +164,11 @@ def cost_of(proposals: int, _: Path) -> None:
     cost(draw_population(cost.space, np.random.default_rng(0), proposals))
 
 
-def step_environments(environments: int, steps: int) -> None:
+def step_environments(environments: int, steps: int, **arguments: Any) -> None:
     """Step environments side by side with random actions."""
     import gymnasium as gym
 
-    env: Any = gym.make_vec(ENVIRONMENT, environments, errors=False)
+    env: Any = gym.make_vec(ENVIRONMENT, environments, errors=False, **arguments)
     env.reset(seed=0)
     rng = np.random.default_rng(0)
     for _ in range(steps):
@@ -168,7 +177,8 @@ def step_environments(environments: int, steps: int) -> None:
 
 
 def environments_side_by_side(environments: int, _: Path) -> None:
-    step_environments(environments, ENVIRONMENT_STEPS)
+    # one instance, as many environments would have met all training instances
+    step_environments(environments, ENVIRONMENT_STEPS, instance=17)
 
 
 def steps_in_a_row(steps: int, _: Path) -> None:
@@ -278,6 +288,14 @@ def write_long_track(frames: int, folder: Path) -> None:
     write_files(folder / "track", long_track(frames))
 
 
+def write_page(frames: int, folder: Path) -> None:
+    """Write the page of a track that repeats a short one."""
+    from posefit.output.files import write_files
+
+    (folder / "track").mkdir()
+    write_files(folder / "track", long_track(frames), ("html",))
+
+
 def long_track(frames: int) -> Any:
     """Return the content of a track that repeats a track of footage."""
     import posefit
@@ -374,6 +392,7 @@ ROWS = {
         "frames", doubled(125, 108_000), track_and_write, write_images, HOUR
     ),
     "files": Row("frames", doubled(125, 108_000), write_long_track, of=HOUR),
+    "page": Row("frames", doubled(1_000, 108_000), write_page, of=HOUR),
     "stream": Row("frames", doubled(250, 108_000), track_stream, of=HOUR),
     "cameras": Row("cameras", doubled(1, 32), partial(track_known, cameras_around)),
     "pixels": Row(
@@ -382,7 +401,9 @@ ROWS = {
         partial(track_known, pixels_high),
     ),
     "proposals": Row("proposals", doubled(1, 1_000_000), cost_of),
-    "environments": Row("environments", doubled(1, 16_384), environments_side_by_side),
+    "environments": Row(
+        "environments", doubled(512, 16_384), environments_side_by_side
+    ),
     "steps": Row("steps", (100_000, 1_000_000, 4_000_000, 10_000_000), steps_in_a_row),
     "plan": Row("cells", doubled(1_000, 1_000_000), plan_cells, of=MILLION),
     "run": Row("cells", doubled(1_000, 1_000_000), run_cells, of=MILLION),
@@ -490,6 +511,8 @@ def work(name: str, size: int, folder: str, prepare: bool) -> None:
         ROWS[name].prepare(size, Path(folder))
         return
     start = time.perf_counter()
+    highest = [0]
+    threading.Thread(target=watch_memory, args=(highest,), daemon=True).start()
     ROWS[name].work(size, Path(folder))
     own = resource.getrusage(resource.RUSAGE_SELF)
     figures = {
@@ -497,8 +520,21 @@ def work(name: str, size: int, folder: str, prepare: bool) -> None:
         "work_seconds": time.perf_counter() - start,
         # Linux counts in kilobytes
         "peak": 1024 * own.ru_maxrss,
+        "without_files": 1024 * highest[0],
     }
     click.echo("\n" + json.dumps(figures))
+
+
+def watch_memory(highest: list[int]) -> None:
+    """Note the highest memory, in kilobytes, that is not of files on the disk.
+
+    The operating system may take back the pages of files at any time.
+    """
+    while True:
+        for line in Path("/proc/self/status").read_text("ascii").splitlines():
+            if line.startswith("RssAnon:"):
+                highest[0] = max(highest[0], int(line.split()[1]))
+        time.sleep(0.2)
 
 
 @main.command(cls=Command, hidden=True)
@@ -564,6 +600,147 @@ def extrapolated(
         f"{values[1] / 1e9:.2f} GB, extrapolated in proportion from "
         f"{sizes[-1]:,.0f}."
     )
+
+
+@main.command(cls=Command)
+@click.argument("page", type=click.Path(exists=True, path_type=Path))
+@click.option("--browser", default="/usr/bin/chromium", help="Its program.")
+def look(page: Path, browser: str) -> None:
+    """Print how long a page takes to its first picture, and the browser's memory."""
+    library: Any = importlib.import_module("playwright.sync_api")
+    with library.sync_playwright() as driver:
+        chromium = driver.chromium.launch(
+            executable_path=browser, args=["--no-sandbox"]
+        )
+        opened = chromium.new_page()
+        start = time.perf_counter()
+        opened.goto(page.absolute().as_uri())
+        # two frames of the browser's: the first was then on the screen
+        opened.evaluate(
+            "() => new Promise(done => requestAnimationFrame("
+            "() => requestAnimationFrame(done)))"
+        )
+        seconds = time.perf_counter() - start
+        megabytes = sum(map(own_megabytes, children_of(os.getpid())))
+        click.echo(
+            f"{page.stat().st_size / 1e6:.1f} MB: first picture after {seconds:.2f} s; "
+            f"the browser's processes have {megabytes:.0f} MB"
+        )
+        chromium.close()
+
+
+def children_of(process: int) -> list[int]:
+    """Return the processes that a process has started, directly or not."""
+    children = []
+    for task in Path(f"/proc/{process}/task").glob("*/children"):
+        for child in map(int, task.read_text("ascii").split()):
+            children += [child, *children_of(child)]
+    return children
+
+
+def own_megabytes(process: int) -> float:
+    """Return a process' memory, of which shared parts are divided among its users."""
+    for line in Path(f"/proc/{process}/smaps_rollup").read_text("ascii").splitlines():
+        if line.startswith("Pss:"):
+            return int(line.split()[1]) / 1e3
+    return 0.0
+
+
+@main.command(cls=Command)
+@click.option("--workers", default="1,2,4,8", help="Numbers of workers.")
+@click.option("--naps", default="0.1,1", help="Seconds of a cell.")
+@click.option("--seconds", default=10.0, help="How long the cells of a worker take.")
+@click.option("--namespaces", default=0, help="Network namespaces; they need root.")
+def cluster(workers: str, naps: str, seconds: float, namespaces: int) -> None:
+    """Print the share of the time of Dask's workers in which cells ran."""
+    from posefit.sweep.cluster import Cluster
+    from posefit.sweep.command import swept
+    from posefit.sweep.engine import Limits
+
+    row = row_maker()
+    for count in map(int, workers.split(",")):
+        with ExitStack() as opened:
+            hosts: list[tuple[str, list[str]]] = [("127.0.0.1", [])]
+            if namespaces:
+                hosts = opened.enter_context(networks(namespaces))
+            address, prefix = hosts[0]
+            own = ["--host", address, "--no-dashboard"]
+            program = [*prefix, sys.executable, "-m", "distributed.cli.dask_scheduler"]
+            opened.enter_context(ended([*program, *own, "--port", str(PORT)]))
+            scheduler = f"tcp://{address}:{PORT}"
+            for k in range(count):
+                address, prefix = hosts[k % len(hosts)]
+                program = [*prefix, sys.executable, "-m", "distributed.cli.dask_worker"]
+                own = ["--host", address, "--nthreads", "1", "--no-dashboard"]
+                opened.enter_context(ended([*program, scheduler, *own, "--no-nanny"]))
+            for nap in map(float, naps.split(",")):
+                run = partial(slept, row, nap)
+                engine = Cluster(scheduler, Limits(), run, 300.0)
+                while len(engine._client.nthreads()) < count:
+                    time.sleep(0.1)
+                # a worker's first cell starts the process in which all of them run
+                for k, cell in zip(range(4 * count), plan_of(1000), strict=False):
+                    engine.submit(replace(cell, seed=1000 + k))
+                left = 4 * count
+                while left:
+                    left -= len(engine.wait(0.2))
+                plan = plan_of(METHODS * max(round(count * seconds / nap / METHODS), 1))
+                folder = opened.enter_context(TemporaryDirectory())
+                began = time.perf_counter()
+                swept(plan, Path(folder), engine, print, quiet=True)
+                took = time.perf_counter() - began
+                click.echo(
+                    f"{count} workers, {len(plan):,} cells of {nap:g} s: {took:.2f} s, "
+                    f"{len(plan) * nap / (count * took):.2f}"
+                )
+
+
+def slept(
+    row: Callable[[Any, float], dict[str, Any]], seconds: float, cell: Any
+) -> dict[str, Any]:
+    """Sleep for a time, and return a cell's row."""
+    time.sleep(seconds)
+    return row(cell, 1.0)
+
+
+@contextmanager
+def ended(words: Sequence[str]) -> Iterator[None]:
+    """Run a program during the body."""
+    quiet = subprocess.DEVNULL
+    with subprocess.Popen(words, stdout=quiet, stderr=quiet) as process:
+        try:
+            yield
+        finally:
+            process.terminate()
+
+
+@contextmanager
+def networks(count: int) -> Iterator[list[tuple[str, list[str]]]]:
+    """Make network namespaces that a bridge connects, as if they were machines.
+
+    Yields the address of each, and the beginning of commands that run there.
+    """
+
+    def ip(words: str) -> None:
+        subprocess.run(["ip", *words.split()], check=True)
+
+    with ExitStack() as made:
+        ip("link add posefit type bridge")
+        made.callback(ip, "link del posefit")
+        ip("addr add 10.77.0.254/24 dev posefit")
+        ip("link set posefit up")
+        hosts = []
+        for k in range(1, count + 1):
+            name = f"posefit{k}"
+            ip(f"netns add {name}")
+            made.callback(ip, f"netns del {name}")
+            ip(f"link add {name} type veth peer name eth0 netns {name}")
+            ip(f"link set {name} master posefit up")
+            ip(f"-n {name} addr add 10.77.0.{k}/24 dev eth0")
+            ip(f"-n {name} link set eth0 up")
+            ip(f"-n {name} link set lo up")
+            hosts.append((f"10.77.0.{k}", ["ip", "netns", "exec", name]))
+        yield hosts
 
 
 @main.command(cls=Command)

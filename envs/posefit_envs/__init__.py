@@ -14,8 +14,9 @@ each action chooses which one continues. Their docstrings are their manual.
 Importing this package registers the environments; each module is imported when its
 environment is made. `drive` runs an optimiser against an environment or a vector of
 them, and `drive_each` one in every environment of a vector. `track_reference` returns
-what a tracker would commit in Track-v1. `to_sb3_vec_env` adapts a vector environment to
-Stable-Baselines3.
+what a tracker would commit in Track-v1. `Corrections` makes FitImage-v1 easier to
+learn, `trained_policy` returns a policy that has learned it, and `to_sb3_vec_env`
+adapts a vector environment to Stable-Baselines3.
 
 A step rasterises proposals in the scenes of a `Stage`. It counts them in a
 `posefit.Problem`, or in `posefit.Problems` for a vector. Each environment's file has a
@@ -29,7 +30,8 @@ single class and a vector class, which share their functions.
 | poses, costs and pictures in many scenes at once; compiled | stage.py, kernels.py |
 | rendering | rendering.py |
 | single environments and vectors in any autoreset mode, row by row | rows.py |
-| optimisers that search an environment; policies | driving.py, policies.py |
+| optimisers that search an environment | driving.py |
+| what learners see; policies, some of them trained | corrections.py, policies.py |
 | Stable-Baselines3 | sb3.py |
 """
 
@@ -39,15 +41,19 @@ from typing import TYPE_CHECKING, Any
 from gymnasium.envs.registration import register
 
 if TYPE_CHECKING:
+    from posefit_envs.corrections import Corrections as Corrections
     from posefit_envs.driving import drive as drive
     from posefit_envs.driving import drive_each as drive_each
     from posefit_envs.driving import track_reference as track_reference
+    from posefit_envs.policies import trained_policy as trained_policy
     from posefit_envs.sb3 import to_sb3_vec_env as to_sb3_vec_env
 
 _MODULES = {
+    "Corrections": "corrections",
     "drive": "driving",
     "drive_each": "driving",
     "track_reference": "driving",
+    "trained_policy": "policies",
     "to_sb3_vec_env": "sb3",
 }
 __all__ = list(_MODULES)

@@ -71,6 +71,7 @@ def checked_actions(
         given = np.asarray(as_numpy("actions", actions)[0])
         if given.dtype.kind == "c":
             raise TypeError("complex numbers")
+        # not to float32: the costs would differ from the library's in the last digits
         values = np.array(given, dtype=np.float64)
     except (TypeError, ValueError) as mistake:
         raise error.InvalidAction(
@@ -319,6 +320,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
 
     def generator(self, i: int) -> np.random.Generator:
         """Return the random generator of environment i."""
+        # not in __init__: seeding takes longer than a step, and reset may bring seeds
         if i not in self._generators:
             self._generators[i] = seeding.np_random(None)
         return self._generators[i][0]
@@ -426,6 +428,8 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         terminated = stepping & terminated
         truncated = stepping & (self.steps >= self._longest)
         self.ended = terminated | truncated
+        # a row has either the infos of its step, or those of the reset that came
+        # instead of it (NEXT_STEP) or after it (SAME_STEP)
         going = stepping
         begun_infos: Infos = self.reset_infos() if not stepping.all() else {}
         final: Infos = {}
@@ -440,6 +444,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
             observations[ended] = self.observe(np.flatnonzero(ended))
             begun_infos = self.reset_infos()
         step_infos = masked_infos(going, infos, begun_infos) | final
+        # Gymnasium's vectors give a reset the reward 0
         rewards = np.where(stepping, rewards, 0.0)
         return observations, rewards, terminated, truncated, step_infos
 

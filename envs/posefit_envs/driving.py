@@ -17,6 +17,7 @@ from posefit.registry import registry
 from posefit.settings import check, planned
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
+from posefit_envs.corrections import Corrections
 from posefit_envs.rows import AnyEnv, rows_of
 from posefit_envs.track import TrackEnv, committed_infos
 
@@ -79,7 +80,7 @@ def _check_actions_reach(env: AnyEnv) -> None:
     """Raise gymnasium.error.Error unless actions reach FitImage-v1 unchanged."""
     wrapper: Any = env
     while wrapper is not env.unwrapped:
-        if isinstance(wrapper, ActionWrapper | VectorActionWrapper):
+        if isinstance(wrapper, ActionWrapper | VectorActionWrapper | Corrections):
             raise error.Error(
                 f"env must take proposals as they are, got {type(wrapper).__name__}: "
                 "drive the environment that it wraps"
@@ -183,6 +184,7 @@ def drive_each(
                 proposals[i] = searches[i].send(costs[i])
             except StopIteration:
                 searching.remove(i)
+                # a row must step with the others: any proposal will do
                 proposals[i] = 0.0
     return problems
 
@@ -248,6 +250,7 @@ def _stepwise(problem: Problem, optimiser: Optimiser) -> Generator[Array, float,
         costs = np.empty(len(proposals))
         for k, proposal in enumerate(proposals):
             costs[k] = yield proposal
+        # counted by hand: the costs came from steps, and the problem was never called
         problem.count(proposals, costs)
         optimiser.tell(proposals, costs)
     if not problem.evaluations:

@@ -1,19 +1,61 @@
-"""Rollouts of policies, and readable observations and actions of Race-v1.
+"""Rollouts of policies, trained ones, and readable observations of Race-v1.
 
 A policy is called with an observation and the step's number. It returns an action.
 """
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from gymnasium.vector import VectorEnv
 
 from posefit.arrays import Array
+from posefit.fitting.check import one_of
 from posefit_envs.race import COMMON_FEATURES, SEARCH_FEATURES
 from posefit_envs.rows import AnyEnv, rows_of
+from posefit_envs.world import checked
 
 Policy = Callable[[Any, int], Array]
+TRAINED = Path(__file__).parent / "trained"
+
+
+def trained_policy(name: str = "fit-image") -> Policy:
+    """Return a policy that has learned FitImage-v1; it needs NumPy alone.
+
+    Args:
+        name: A file of the folder `trained`, where a card of the same name says what
+            the policy has seen, how well it does, and how it was made.
+
+    Returns:
+        The policy. It takes observations of `Corrections`, and returns its actions.
+
+    Raises:
+        ArgumentError: There is no policy of that name.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> from posefit_envs import Corrections, trained_policy
+        >>> env = gym.make_vec("posefit_envs:posefit/FitImage-v1", 3, split="test")
+        >>> env = Corrections(env)
+        >>> observations, _ = env.reset(options={"instance": [10_000, 10_001, 10_002]})
+        >>> trained_policy("fit-image")(observations, 0).shape
+        (3, 9)
+    """
+    names = sorted(path.stem for path in TRAINED.glob("*.npz"))
+    checked(one_of, "name", name, names)
+    with np.load(TRAINED / f"{name}.npz") as file:
+        arrays = [np.asarray(file[key], dtype=np.float32) for key in file.files]
+    layers = list(zip(arrays[::2], arrays[1::2], strict=True))
+
+    def policy(observations: Any, _: int) -> Array:
+        values = np.asarray(observations, dtype=np.float32)
+        for weights, biases in layers[:-1]:
+            values = np.maximum(values @ weights + biases, 0.0)
+        weights, biases = layers[-1]
+        return np.asarray(values @ weights + biases, dtype=np.float64)
+
+    return policy
 
 
 def rollout(

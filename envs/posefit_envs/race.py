@@ -113,6 +113,7 @@ class Races:
     def _begin_search(self, row: int, search: int) -> None:
         """Replace one of a race's searches by a new one."""
         space = self.stage.space(row)
+        # a separate generator: what one search draws changes no other
         rng = np.random.default_rng(int(self._rngs[row].integers(2**63)))
         self._optimisers[row][search] = checked(
             lambda: self._factory(space, rng, **self._settings)
@@ -134,6 +135,7 @@ class Races:
         """
         before = self.problems.best_costs[rows]
         chosen = actions.argmax(axis=1)
+        # the last choice stands for no search yet: the worst one makes room
         for k in np.flatnonzero(chosen == self.searches).tolist():
             row = int(rows[k])
             chosen[k] = self.costs[row].argmax()
@@ -189,6 +191,7 @@ class Races:
     def observations(self) -> NDArray[np.float32]:
         """Return the features (n, 4 searches + 3) of the races."""
         budgets = self.budgets[:, None]
+        # spreads shrink by factors, so that their logarithm is the even scale
         widths = np.maximum(self.spreads / MIN_SPREAD, 1.0)
         features = [
             log_cost(self.costs),
@@ -213,9 +216,10 @@ class Races:
             "instance": numbers.copy(),
         }
         if self.world.shows_truth:
-            # alignment moves the body but not the pose, so no row is aligned
-            nobody = self.stage.all_rows[:0]
-            poses = self.stage.decode(problems.best[:, None], nobody)[0][:, 0]
+            # alignment would move the body and leave the pose as it is: align no row
+            no_rows = self.stage.all_rows[:0]
+            poses, _ = self.stage.decode(problems.best[:, None], no_rows)
+            poses = poses[:, 0]
             infos["error_degrees"] = error_degrees(self.stage.truths, poses)
         return infos
 

@@ -69,6 +69,7 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
                 fresh, fresh_infos = rows.begun
                 if rows.mode is not AutoresetMode.SAME_STEP:
                     fresh, fresh_infos = rows.reset(None, no_options, done)
+                # its learners expect the first picture of the next episode here
                 observations = mixed(done, fresh, observations)
                 for i in np.flatnonzero(done).tolist():
                     self.reset_infos[i] = fresh_infos[i]

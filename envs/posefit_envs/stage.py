@@ -82,14 +82,17 @@ class SceneRow(NamedTuple):
 def first_scene(world: World, number: int) -> SceneRow:
     """Return the scene of an instance's first frame. Small scenes are cached."""
     width, height = world.size
-    remembers = width * height * len(world.view_degrees) <= LARGEST_REMEMBERED
-    return (_first_scene if remembers else _first_scene.__wrapped__)(world, number)
+    if width * height * len(world.view_degrees) > LARGEST_REMEMBERED:
+        return _made_scene(world, number)
+    return _remembered_scene(world, number)
 
 
-@lru_cache(maxsize=len(TRAINING))
-def _first_scene(world: World, number: int) -> SceneRow:
+def _made_scene(world: World, number: int) -> SceneRow:
     made = instance(world, number)
     return SceneRow.of(made.cost(0, first_space(world, made)), made.truth.poses[0])
+
+
+_remembered_scene = lru_cache(maxsize=len(TRAINING))(_made_scene)
 
 
 class Drawn(NamedTuple):

@@ -137,7 +137,8 @@ class TrackEnv(SearchEnv):
         observation = self.stage.pictures(self.stage.all_rows)[0]
         self._done = 0
         infos = row_of(infos_before(self.stage, self.world.shows_truth), 0)
-        return observation, self._infos(infos, nothing_committed(self.world))
+        self._count(infos)
+        return observation, infos | nothing_committed(self.world)
 
     def _begin_frame(self) -> None:
         self._problem = self._sequence.problem()
@@ -148,45 +149,57 @@ class TrackEnv(SearchEnv):
         proposal = self.checked_action(action)[None]
         rows = self.stage.all_rows
         problem = self.problem
-        sequence = self._sequence
         drawn = self.stage.draw(proposal, rows)
         problem.count(proposal, drawn.costs)
         self._cost = float(drawn.costs[0])
+        self._done += 1
         observation = drawn.pictures[0]
         reward = float(reward_of_cost(self._cost))
         infos = row_of(proposal_infos(self.stage, drawn, self.world.shows_truth), 0)
-        self._done += 1
+        # before a pose is committed: the counts are of the frame of the proposal
+        self._count(infos)
         committed = nothing_committed(self.world)
         if not problem.remaining_evaluations:
-            poses, places = self.stage.decode(problem.best[None, None], rows)
-            committed = committed_infos(
-                sequence.instance,
-                sequence.frame,
-                poses[0, 0],
-                places[0, 0],
-                problem.best_cost,
-                self.world.shows_truth,
-            )
-            self.ended = sequence.commit(problem.best)
+            committed = self._commit()
             if not self.ended:
-                self._begin_frame()
-                self.stage.set_body(0, poses[0, 0], places[0, 0])
                 observation = self.stage.pictures(rows)[0]
-        # the counts are of the frame that the proposal was for
-        infos = self._infos(infos, committed, problem)
-        return observation, reward, self.ended, False, infos
+        infos["frame"] = self._frame()
+        return observation, reward, self.ended, False, infos | committed
 
-    def _infos(
-        self, infos: Infos, committed: Infos, problem: Problem | None = None
-    ) -> Infos:
-        """Return the infos of the only row, completed by the counts of a problem."""
-        problem = problem or self.problem
+    def _commit(self) -> Infos:
+        """Commit the best proposal of the frame, and begin the next frame.
+
+        Return the infos of the committed pose.
+        """
+        problem = self.problem
+        sequence = self._sequence
+        poses, places = self.stage.decode(problem.best[None, None], self.stage.all_rows)
+        committed = committed_infos(
+            sequence.instance,
+            sequence.frame,
+            poses[0, 0],
+            places[0, 0],
+            problem.best_cost,
+            self.world.shows_truth,
+        )
+        self.ended = sequence.commit(problem.best)
+        if not self.ended:
+            self._begin_frame()
+            self.stage.set_body(0, poses[0, 0], places[0, 0])
+        return committed
+
+    def _count(self, infos: Infos) -> None:
+        """Add the counts to the infos of the only row."""
+        problem = self.problem
         infos["best_cost"] = problem.best_cost
         infos["evaluations"] = problem.evaluations
         infos["remaining_steps"] = self.frames * self.evaluations_per_frame - self._done
-        infos["frame"] = min(self._sequence.frame, self.frames - 1)
+        infos["frame"] = self._frame()
         infos["instance"] = self.number
-        return infos | committed
+
+    def _frame(self) -> int:
+        # after the last frame an episode stays in it
+        return min(self._sequence.frame, self.frames - 1)
 
     @property
     def instance(self) -> Instance:

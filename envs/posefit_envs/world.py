@@ -193,10 +193,10 @@ def world_of(own: Sequence[str] = (), /, **arguments: Any) -> World:
     for name in arguments:
         if name not in known:
             every = *known, *own
-            # libraries that pass on arguments look for "an unexpected keyword argument"
+            # Python's own words, by which TorchRL knows what to leave out
             raise TypeError(
-                "an unexpected keyword argument: it must be one of "
-                f"{', '.join(every)}, got {quoted(name)}{suggestion(name, every)}"
+                f"unexpected keyword argument {quoted(name)}"
+                f"{suggestion(name, every)}: it must be one of {', '.join(every)}"
             )
     world = World(**arguments)
     checked(one_of, "split", world.split, SPLITS)
@@ -451,6 +451,7 @@ def instance(
     machine.
     """
     motion = world.motion_of(number)
+    # built-in motions are made at the instance's speed, files are cut
     source = motion if motion in built_in.names() else _source(motion)
     try:
         truth = motion_of_instance(source, number, frames=frames, fps=FPS)
@@ -464,6 +465,7 @@ def instance(
     facing = float(truth.poses[0, 0])
     middle = truth.translations.mean(axis=0)
     middle[1] = HEIGHT
+    # who walks farther is seen from farther away, and stays in the picture
     reach = DISTANCE + 0.5 * float(np.ptp(truth.translations[:, [0, 2]], axis=0).max())
     turn = rng.uniform(-180.0, 180.0) if world.yaw == "unknown" else 0.0
     azimuths = [
@@ -487,6 +489,7 @@ def instance(
     if world.yaw == "unknown":
         yaw = azimuths[0]  # facing the camera
     fitted = varied(body, world.mismatch_percent, rng)
+    # drawn last, so that arguments leave the numbers above as they are
     anchor = truth.translations[0].copy()
     if world.translation == "searched":
         anchor += rng.uniform(-MIDDLE_METRES, MIDDLE_METRES, 3)

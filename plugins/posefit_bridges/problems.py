@@ -2,7 +2,7 @@
 
 | tool | function | result |
 |---|---|---|
-| IOHexperimenter | ioh_problem | a problem for its loggers |
+| IOHexperimenter | ioh_problem, close_log | a problem for its loggers |
 | OptunaHub | optunahub_problem | a benchmark for studies of Optuna |
 | pymoo | pymoo_problem | a problem, evaluated a population at a time |
 | Nevergrad | nevergrad_function | a function of its benchmarks |
@@ -18,6 +18,7 @@ budget: a problem's budget ends the tool's loop with an error.
 9
 """
 
+from pathlib import Path
 from typing import Any
 
 from posefit.arrays import Array
@@ -33,8 +34,7 @@ def ioh_problem(problem: Problem) -> Any:
     """Return a problem of IOHexperimenter.
 
     It has the number, the instance, the bounds and, if known, the optimum. Its name
-    begins with the suite's name, because ioh 0.4 does not let other packages write the
-    log's field for it, `unknown_suite`.
+    begins with the suite's name. `close_log` writes that name into the log.
 
     Evaluations are counted by the suite's problem, whose budget holds here too; `reset`
     resets both. J. de Nobel et al., IOHexperimenter: benchmarking platform for
@@ -69,6 +69,23 @@ def ioh_problem(problem: Problem) -> Any:
             problem.reset()
 
     return IOHProblem()
+
+
+def close_log(logger: Any, suite: str = SUITE) -> None:
+    """Close a logger of IOHexperimenter, and name the suite in its log.
+
+    ioh 0.4 itself writes `unknown_suite` for problems of other packages.
+
+    Args:
+        logger: An `ioh.logger.Analyzer`.
+        suite: The suite of its problems.
+    """
+    logger.close()
+    for path in Path(logger.output_directory).glob("IOHprofiler_f*.json"):
+        text = path.read_text("utf-8")
+        # ioh writes nan, which is not JSON, so replace the text alone
+        text = text.replace('"suite": "unknown_suite"', f'"suite": "{suite}"', 1)
+        path.write_text(text, "utf-8")
 
 
 def optunahub_problem(problem: Problem) -> Any:

@@ -210,10 +210,10 @@ def reproduce(
         ImportError: If the library that draws figures is not installed.
     """
     if out is not None:
-        from posefit.report.figures import library
+        from posefit.report.figures import empty_figure
 
         # fails now rather than after hours of runs
-        library("")
+        empty_figure()
     with nullcontext(out) if out is not None else TemporaryDirectory() as place:
         folder = Path(place)
         _make_runs_folder(folder)

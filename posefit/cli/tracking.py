@@ -170,7 +170,7 @@ def _print(
     if out:
         kinds = chosen_kinds(options["write"])
         shown = [hint for kind, hint in hints.items() if kind in kinds]
-        files = [WRITERS[kind][0] for kind in kinds]
+        files = [WRITERS[kind].file for kind in kinds]
         click.echo(f"written to {out}: {', '.join(shown or files)}")
     elif not verbose:
         click.echo("--verbose prints all figures; --out DIR writes files")

@@ -20,8 +20,9 @@ Each row is one step, in one file:
 | values of all masks | the ones that are the person | values.py |
 | images, an .npz or .npy file | a `views.View`: one bit per pixel | readers.py |
 | masks from other tools | one person's masks, not inverted, no holes | cleaning.py |
-| a video file, or one picture per frame | frames at even times | video.py |
-| frames | the same at the size of masks, kept if needed again | scaled.py |
+| a video file, or one picture per frame | frames at the size of masks | video.py |
+| times of a file's frames | a rate, and the frame at each even time | rates.py |
+| decoded frames | the same again, from a temporary file | kept.py |
 | one frame | the people in it | segmenter.py, extraction.py |
 | frames in their order | people, their masks and quality | scanner.py |
 | blobs of successive frames | people, and which one is followed | people.py |
@@ -30,18 +31,29 @@ Each row is one step, in one file:
 | a network's facings | which way the person faces | facing.py |
 | a video | a `View` of the person in it | segmentation.py |
 | masks of segmented frames | a verdict: can they be a person? | quality.py |
+| masks of several cameras | a verdict: can they be one person? | agreement.py |
 | a `View` | the files of `posefit extract` | extract.py |
+| pictures | an .mp4 file | writing.py |
 | a stream | a `View` of each frame | live.py |
 | calibrations and sources | which camera took which source | pairing.py |
 | calibrations | the axes and the unit of their world | world.py |
 | a `View` and its calibration | the same without distortion | straightening.py |
 | views and calibrations | the `Scene`, in metres, +y up | cameras.py |
+| views of the same frames | the silhouettes of each frame | observations.py |
 | a known motion | the `Scene` of its rasterised masks | scene.py |
 | a `Scene` | the same on a device, such as a GPU | device.py |
 
-To add a kind of source, write a reader and add a line to `kinds.KINDS`. Decoded masks
-are stored as bits at once, and a `View` never changes. What a source does not state is
-guessed in one of these files and listed in `Scene.guesses`. The next steps from a mask
-to its cost are `silhouette/mask.py`, `fitting/tracker.py`, `fitting/cost.py`,
-`silhouette/cost.py` and `silhouette/kernels.py`.
+To add a kind of source, write a reader and add a line to `kinds.KINDS`. The reader of a
+file of masks decodes them to an array, and returns `readers.view_of` it:
+
+    def read_stack(path, frames, label, fps):
+        arrays = {"masks": decoded(existing(path))}  # (T, height, width)
+        return view_of(str(path), arrays, frames, label, fps)
+
+    Kind("masks", _ends_in(".stack"), view=read_stack),
+
+Decoded masks are stored as bits at once, and a `View` never changes. What a source does
+not state is guessed in one of these files and listed in `Scene.guesses`. The next steps
+from a mask to its cost are `silhouette/mask.py`, `fitting/tracker.py`,
+`fitting/cost.py`, `silhouette/cost.py` and `silhouette/kernels.py`.
 """

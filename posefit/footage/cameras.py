@@ -9,28 +9,27 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError, NoPersonError
 from posefit.fitting.tracker import Observation
-from posefit.footage.facing import yaws_of
-from posefit.footage.options import SourceOptions
-from posefit.footage.people import Persons, part_at, paste
-from posefit.footage.quality import (
+from posefit.footage.agreement import (
     apparent_size,
     apparent_sizes,
     disagreement,
     extent_of,
     meeting,
+    shared_extents,
 )
+from posefit.footage.facing import yaws_of
+from posefit.footage.observations import Observations
+from posefit.footage.options import SourceOptions
+from posefit.footage.people import Persons, part_at, paste
 from posefit.footage.scene import Scene
 from posefit.footage.straightening import fitting, straightening
-from posefit.footage.views import Observations, View
-from posefit.footage.world import unit_by_height, world_of
+from posefit.footage.views import View
+from posefit.footage.world import LEAST_HEIGHT, is_open, unit_by_height, world_of
 from posefit.geometry.body import Body
 from posefit.geometry.calibration import Calibration
 from posefit.geometry.camera import Camera
 from posefit.motion.clips import FPS
 from posefit.silhouette.mask import Silhouette
-
-# a height of 0 or less, of a person behind a camera, would have no logarithm
-LEAST_HEIGHT = 1e-9
 
 
 def combined(
@@ -152,21 +151,30 @@ def _of_one_size(
         NoPersonError: The cameras cannot all see one person of this size.
 
     """
-    apparent = apparent_sizes(observations, cameras)
-    if apparent is None:
+    frames = shared_extents(observations)
+    if not frames:
         return [*cameras], ""
-    miss, tall = apparent
+
+    def scaled(factor: float) -> list[Camera]:
+        """Return the cameras with all lengths of an open unit times a factor."""
+        result = list[Camera]()
+        for camera, given in zip(cameras, known, strict=True):
+            if is_open(given):
+                camera = replace(camera, translation=factor * camera.translation)
+            result.append(camera)
+        return result
+
+    def measured(factor: float) -> tuple[float, Array]:
+        return apparent_sizes(scaled(factor), frames)
+
     metres, is_guess = unit
     factor = 1.0
     guess = ""
     if is_guess:
-        factor, guess = unit_by_height(miss, tall, known, metres, stature)
-    if wrong := disagreement(factor * miss, factor * tall, stature):
+        factor, guess = unit_by_height(measured, known, metres, stature)
+    if wrong := disagreement(*measured(factor), stature):
         raise NoPersonError(wrong)
-    scaled = [
-        replace(camera, translation=factor * camera.translation) for camera in cameras
-    ]
-    return scaled, guess
+    return scaled(factor), guess
 
 
 def _first_yaw(

@@ -22,8 +22,8 @@ from posefit.footage.scene import observed_views
 from posefit.footage.segmentation import Segmentation
 from posefit.footage.source import films_of, scene_of, views_of_masks
 from posefit.footage.uses import useless_for
-from posefit.footage.video import VideoWriter
 from posefit.footage.views import Range, View, border_of
+from posefit.footage.writing import VideoWriter
 from posefit.motion.clips import FPS
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
@@ -74,7 +74,8 @@ def extract(
     resolved = resolve(source)
     how = how or Extraction()
     # checked before the folder is made
-    parts = [Segmentation(film, how, frames) for film in films_of(resolved)]
+    films = films_of(resolved, how.width)
+    parts = [Segmentation(film, how, frames) for film in films]
     if not parts and how != Extraction(person=how.person):
         raise useless_for(resolved.medium, "extraction", how, "video")
     with suppress(OSError):  # reported where the folder is made

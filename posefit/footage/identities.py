@@ -68,7 +68,7 @@ def with_identities(
         most = max(range(len(persons)), key=indices.count)
         choices = [1] if most == 0 else [1, 1 + most]
     for choice in choices:
-        parts, _ = everyone.people.chosen(choice, str, 1.0 / all_people.scaled.scale)
+        parts, _ = everyone.people.chosen(choice, str, 1.0 / all_people.video.scale)
         others = everyone.people.others(parts)
         scan = _without_others(all_people, single, parts, others, progress)
         frames = _frames_of(parts, persons, scan)
@@ -110,7 +110,7 @@ def _without_others(
     """
 
     def changed(k: int, image: Image) -> Image:
-        excluded = excluded_mask(parts, others, k, all_people.scaled.size)
+        excluded = excluded_mask(parts, others, k, all_people.video.size)
         return all_people.segmenter.without(image, excluded)
 
     return single.again().scan(progress, changed)

@@ -86,8 +86,10 @@ class Kind(NamedTuple):
     recognises: Callable[[Place], bool]
     # (place, frames, label, fps) to the view
     view: Callable[[Any, Range, int | None, float | None], View] | None = None
-    # (place, fps) to the film
-    film: Callable[[Any, float | None], Video] | None = None
+    # (place, fps, width) to the film, scaled down to the width
+    film: Callable[[Any, float | None, int], Video] | None = None
+    # place to the number of its first frame; None if frames are counted from 0
+    first: Callable[[Any], int] | None = None
 
 
 def _is_film(place: Place) -> bool:
@@ -122,11 +124,11 @@ def _ends_in(suffix: str) -> Callable[[Place], bool]:
 # the first kind that recognises a source reads it
 KINDS = (
     Kind("masks", lambda place: isinstance(place, np.ndarray), view=read_array),
-    Kind("masks", _ends_in(".npz"), view=read_npz),
+    Kind("masks", _ends_in(".npz"), view=read_npz, first=first_number),
     Kind("masks", _ends_in(".npy"), view=read_npy),
     Kind("pictures", _is_film, film=Video.of_pictures),
     Kind("masks", lambda place: isinstance(place, Images), view=read_images),
-    Kind("video", _is_video, film=lambda place, _: Video.of(place)),
+    Kind("video", _is_video, film=lambda place, _, width: Video.of(place, width)),
     Kind("motion", lambda _: True),  # names of motions need no suffix
 )
 
@@ -201,15 +203,11 @@ def _with_numbers(places: Sequence[Place]) -> list[Place]:
 
 
 def first_of(source: Resolved) -> int:
-    """Return the number of the first frame that all cameras have.
-
-    An .npz file of masks may state the number of its first frame. Other sources begin
-    at 0.
-    """
+    """Return the number of the first frame that all cameras have."""
     first = 0
     for kind, place in zip(source.kinds, source.places, strict=True):
-        if kind.view is read_npz:
-            first = max(first, first_number(Path(str(place))))
+        if kind.first is not None:
+            first = max(first, kind.first(place))
     return first
 
 

@@ -20,7 +20,6 @@ from posefit.errors import InputError
 from posefit.files import opencv_name
 from posefit.footage.extraction import Extraction
 from posefit.footage.images import PIXELS
-from posefit.footage.scaled import ScaledVideo
 from posefit.footage.segmenter import PersonSegmenter
 from posefit.footage.video import Video, scaled
 from posefit.footage.views import View
@@ -222,8 +221,8 @@ def live_views(
         how = Extraction(background=f"0:{len(learned)}")
     else:
         images = chain([first], images)
-    before = Video.of_images(learned, Path(stream.name), stream.fps)
-    video = ScaledVideo(before, how.width)
+    name = Path(stream.name)
+    video = Video.of_images(learned, name, stream.fps, how.width)
     segmenter = PersonSegmenter(video, how)
     quality = None
     for live in images:

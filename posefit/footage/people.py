@@ -5,7 +5,7 @@ meet, one blob shows several of them. Pixels where only one person is expected b
 that person, and the rest of the blob is unknown.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import cv2
@@ -98,7 +98,6 @@ class Tracklet:
     def __init__(self, blob: _Blob, frame: int) -> None:
         self.detections: dict[int, Detection] = {}  # by frame
         self.rows: dict[int, dict[str, Any]] = {}  # by frame, of `FrameQuality`
-        self.quality: Any = None  # the `FrameQuality` of this person
         # where they appear: frame, column and row
         self.first = (frame, *blob.place.tolist())
         # the latest blob that shows them alone, and its frame
@@ -148,6 +147,10 @@ class Tracklet:
         self.latest = blob
         self.detections[frame] = Detection(cut_out(blob.mask), None)
 
+    def end(self) -> None:
+        """Free what only later frames need, or memory would grow with noise."""
+        self.latest.mask = np.empty((0, 0), dtype=bool)
+
     def confirmed(self, least: float = MIN_DETECTIONS) -> bool:
         """Return whether the person is visible in enough frames not to be noise."""
         return self._frames >= min(MIN_DETECTIONS, least)
@@ -188,26 +191,14 @@ class People:
         self._frame += 1
         frame = self._frame
         blobs = [_Blob(mask, image) for mask in masks]
-        active = []
-        for tracklet in self.active:
-            if frame - max(tracklet.detections) <= MAX_GAP_SECONDS * self._fps:
-                active.append(tracklet)
-            else:
-                # what only later frames need is freed, or memory would grow with noise
-                tracklet.latest.mask = np.empty((0, 0), dtype=bool)
-                tracklet.quality = None
-        owners = _owners(active, blobs, frame)
-        confirmed = [
-            tracklet
-            for tracklet in active
-            if tracklet.confirmed() and tracklet not in owners.values()
-        ]
-        outlines = [tracklet.outline(frame) for tracklet in confirmed] if blobs else []
+        self._end_lost(frame)
+        owners = _owners(self.active, blobs, frame)
+        outlines = self._hidden_outlines(owners, frame) if blobs else []
         present = []
         for k, blob in enumerate(blobs):
             # people without a blob who are probably in this one
             hidden = list[Tracklet]()
-            for tracklet, outline in zip(confirmed, outlines, strict=True):
+            for tracklet, outline in outlines:
                 is_large = tracklet.area >= RIVAL_AREA * blob.area
                 covered = (outline & blob.mask).sum()
                 if is_large and covered > COVERED * outline.sum():
@@ -216,7 +207,7 @@ class People:
             if owner is None and not hidden:
                 owner = Tracklet(blob, frame)
                 self.tracklets.append(owner)
-                active.append(owner)
+                self.active.append(owner)
             if owner is not None and not hidden:
                 owner.update(blob, frame)
                 present.append(owner)
@@ -224,8 +215,27 @@ class People:
                 group = hidden if owner is None else [*hidden, owner]
                 _share(blob, group, frame)
                 present += group
-        self.active = active
         return present
+
+    def _end_lost(self, frame: int) -> None:
+        """Expect people no longer who were not seen for `MAX_GAP_SECONDS`."""
+        active = list[Tracklet]()
+        for tracklet in self.active:
+            if frame - max(tracklet.detections) <= MAX_GAP_SECONDS * self._fps:
+                active.append(tracklet)
+            else:
+                tracklet.end()
+        self.active = active
+
+    def _hidden_outlines(
+        self, owners: Mapping[int, Tracklet], frame: int
+    ) -> list[tuple[Tracklet, Mask]]:
+        """Return the people without a blob, and the mask where each is expected."""
+        hidden = list[tuple[Tracklet, Mask]]()
+        for tracklet in self.active:
+            if tracklet.confirmed() and tracklet not in owners.values():
+                hidden.append((tracklet, tracklet.outline(frame)))
+        return hidden
 
     def persons(self) -> Persons:
         """Return the people, the longest visible first.

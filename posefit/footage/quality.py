@@ -1,4 +1,4 @@
-"""Judge whether segmented masks show a person: per frame, per video, between cameras.
+"""Judge whether segmented masks show a person: per frame, and per video.
 
 The true mask is unknown. So a frame's mask is compared with its picture, with earlier
 pictures, and with the learned background if the segmenter has one.
@@ -14,12 +14,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array
 from posefit.footage.people import MIN_DETECTIONS, SLACK
-from posefit.footage.views import MOST, Observations
-from posefit.geometry.camera import Camera
-from posefit.silhouette.foreground import SAMPLES, Image, Person
-from posefit.silhouette.mask import Mask, Silhouette, box_of, padded_box
+from posefit.footage.views import MOST
+from posefit.silhouette.foreground import Image, Person
+from posefit.silhouette.mask import Mask, box_of, padded_box
 
 # per frame
 AREA_FRAMES = 15  # number of earlier frames that a frame's area is compared with
@@ -48,15 +46,6 @@ LARGER = 0.25
 CHANGE_PERCENTILE = 90
 # share of the frames whose masks show an empty place: with more, the user is warned
 GHOSTS = 0.1
-
-# between cameras
-# share of the person's height by which rays through the middles of masks may miss each
-# other
-APART = 0.7
-# a person's apparent height, times the real one: crouching or seen from above, and with
-# the arms up
-SHORT = 0.45
-TALL = 1.9
 
 
 class FrameQuality:
@@ -291,112 +280,3 @@ def _change(
         return 0.0
     ratios = [abs(np.log(after[name] / before[name])) for before, after in pairs]
     return float(np.expm1(np.percentile(ratios, CHANGE_PERCENTILE)))
-
-
-def extent_of(silhouette: Silhouette) -> tuple[Array, float]:
-    """Return the middle (2,) and the height of a silhouette's box, in pixels."""
-    left, top, right, bottom = box_of(silhouette.mask)
-    return 0.5 * np.array([left + right, top + bottom]), float(bottom - top)
-
-
-def meeting(cameras: Sequence[Camera], middles: Sequence[Array]) -> tuple[Array, Array]:
-    """Return where the rays of cameras meet best.
-
-    Args:
-        cameras: n cameras.
-        middles: The pixel (2,) of each camera that its ray passes through.
-
-    Returns:
-        The point (3,) with the least squared distances from all rays, and its distance
-        (n,) from each ray.
-
-    """
-    positions = [camera.position for camera in cameras]
-    # the projection (3, 3) onto the plane across each ray
-    across = list[Array]()
-    for camera, middle in zip(cameras, middles, strict=True):
-        in_camera = np.array([*((middle - camera.centre) / camera.focal), 1.0])
-        ray = camera.rotation.T @ in_camera
-        across.append(np.eye(3) - np.outer(ray, ray) / (ray @ ray))
-    rays = list(zip(across, positions, strict=True))
-    # the normal equations of the least squares
-    left = np.sum(across, axis=0)
-    right = np.sum([plane @ position for plane, position in rays], axis=0)
-    place = np.linalg.lstsq(left, right)[0]
-    away = [np.linalg.norm(plane @ (place - position)) for plane, position in rays]
-    return place, np.array(away)
-
-
-def apparent_sizes(
-    observations: Observations, cameras: Sequence[Camera]
-) -> tuple[float, Array] | None:
-    """Return the medians of `apparent_size` over frames; None if none is usable.
-
-    A frame is usable here if it is usable in all views.
-    """
-    count = len(observations)
-    each = [view.usable[:count] for view in observations.views]
-    usable = np.flatnonzero(np.all(each, axis=0)).tolist()
-    if not usable:
-        return None
-    misses = []
-    heights = []
-    for k in np.unique(np.linspace(0, len(usable) - 1, SAMPLES).astype(int)):
-        silhouettes = observations[usable[k]].silhouettes
-        extents = [extent_of(silhouette) for silhouette in silhouettes]
-        miss, tall = apparent_size(cameras, extents)
-        misses.append(miss)
-        heights.append(tall)
-    return float(np.median(misses)), np.asarray(np.median(heights, axis=0))
-
-
-def apparent_size(
-    cameras: Sequence[Camera], extents: Sequence[tuple[Array, float]]
-) -> tuple[float, Array]:
-    """Return how well several cameras agree on a person's place and height.
-
-    Args:
-        cameras: n cameras.
-        extents: The middle (2,) and the height of the person in each picture, in
-            pixels.
-
-    Returns:
-        By how much the rays through the middles miss each other, and how tall (n,) the
-        person is in each view, both in the cameras' unit. A height is negative if the
-        rays meet behind that camera.
-
-    """
-    place, away = meeting(cameras, [middle for middle, _ in extents])
-    heights = list[float]()
-    for camera, (_, tall) in zip(cameras, extents, strict=True):
-        depth = (camera.rotation @ place + camera.translation)[2]
-        heights.append(tall * depth / camera.focal[1])
-    return 2.0 * float(away.max()), np.array(heights)
-
-
-def disagreement(miss: float, tall: Array, stature: float) -> str | None:
-    """Return why cameras cannot all see one person; None if they can.
-
-    Args:
-        miss: By how much their rays miss each other, see `apparent_size`.
-        tall: (n,) how tall the person seems in each view.
-        stature: The person's height. All are in metres.
-
-    """
-    reasons = (
-        "the masks show only parts of the person, or another one, "
-        "or the calibrations are in another order or unit"
-    )
-    if miss > APART * stature:
-        return (
-            "expected cameras that see one person, got views that disagree by "
-            f"{miss:.1f} m: {reasons}"
-        )
-    wrong = np.flatnonzero((tall < SHORT * stature) | (tall > TALL * stature))
-    if len(wrong):
-        k = int(wrong[0])
-        return (
-            f"expected a person of {stature:.2f} m, got masks {tall[k]:.2f} m tall in "
-            f"view {k + 1}: {reasons}"
-        )
-    return None

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.archive import Stored, archived, mapped
+from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.footage.images import FORMATS, PIXELS, Marks, page_count, read_marks
 from posefit.footage.numbering import Images
@@ -41,20 +42,22 @@ ARRAYS = (".npz", ".npy")  # files of masks
 PACKED = 2_000_000_000  # largest .npz file that is opened, in bytes
 NAMES = ("masks", "valid", "usable", "fps", "first", "landmarks")  # keys of an .npz
 LAST = 1_000_000_000  # largest number of a frame; larger ones are mistakes
+# by name, as in `NAMES`; only `masks` is required
+Arrays = Mapping[str, Stored | NDArray[Any]]
 
 
 def read_array(
     stack: NDArray[Any], frames: Range, label: int | None, fps: float | None
 ) -> View:
     """Return the view of masks (T, height, width) in memory."""
-    return _packed("masks", {"masks": stack}, frames, label, fps)
+    return view_of("masks", {"masks": stack}, frames, label, fps)
 
 
 def read_npy(path: Path, frames: Range, label: int | None, fps: float | None) -> View:
     """Return the view of an .npy file of masks."""
     stack = mapped(existing(path))
     check_decoded(str(path), stack.nbytes)
-    return _packed(str(path), {"masks": stack}, frames, label, fps)
+    return view_of(str(path), {"masks": stack}, frames, label, fps)
 
 
 def read_npz(path: Path, frames: Range, label: int | None, fps: float | None) -> View:
@@ -62,13 +65,13 @@ def read_npz(path: Path, frames: Range, label: int | None, fps: float | None) ->
     existing(path)
     with archived(path, NAMES, "the key masks", PACKED, single=True) as arrays:
         check_decoded(str(path), sum(array.nbytes for array in arrays.values()))
-        return _packed(str(path), arrays, frames, label, fps)
+        return view_of(str(path), arrays, frames, label, fps)
 
 
 def first_number(path: Path) -> int:
     """Return the number of the first frame that an .npz file states; 0 by default."""
     with archived(path, NAMES, "the key masks", PACKED, single=True) as arrays:
-        return int(np.asarray(arrays["first"])) if "first" in arrays else 0
+        return _stated_first(str(path), arrays)
 
 
 def read_images(
@@ -150,18 +153,20 @@ def _marks(
             )
 
 
-def _packed(
+def view_of(
     name: str,
-    arrays: Mapping[str, Stored | NDArray[Any]],
+    arrays: Arrays,
     frames: Range,
     label: int | None,
     rate: float | None,
 ) -> View:
-    """Return the view of the arrays of an .npz file, named as in `NAMES`.
+    """Return the view of arrays of masks, named as in `NAMES`.
+
+    This is what the reader of a new kind of file calls once it has decoded the masks.
 
     Args:
         name: What messages call the source.
-        arrays: The arrays by name; only `masks` is required.
+        arrays: The arrays by name.
         frames: Which frames to read.
         label: The person's value; None to find it out.
         rate: Frames per second; None for what the arrays state.
@@ -172,59 +177,38 @@ def _packed(
     """
     stack = _checked_stack(name, arrays)
     count, height, width = stack.shape
-    fps = _stated_rate(name, arrays)
-    first = int(np.asarray(arrays["first"])) if "first" in arrays else 0
-    if not 0 <= first <= LAST:
-        raise InputError(
-            f"{name}: first must be the number of a frame up to {LAST:,}, got {first}"
-        )
+    fps = rate or _stated_rate(name, arrays)
+    first = _stated_first(name, arrays)
     start, stop = span(frames, count, first)
-    usable = np.ones(count, dtype=bool)
-    if "usable" in arrays:
-        usable = np.asarray(arrays["usable"])
-    if not usable[start:stop].any():
-        raise InputError(
-            f"{name}: expected a frame that is usable, got none from {start} to {stop}"
-        )
+    usable = _stated_usable(name, arrays, start, stop)
     size = (width, height)
     is_person = above(0.0)
     guesses = list[str]()
     # the values of booleans need no count
     if stack.dtype.kind != "b" or label is not None:
         _, is_person, guesses = _decided(_chosen(name, stack, start, stop), label, name)
-    masks = _pack(_chosen(name, stack, start, stop), stop - start, size, is_person)
-    valid = None
+    bits = _pack(_chosen(name, stack, start, stop), stop - start, size, is_person)
+    known = None
     if "valid" in arrays:
         planes = _chosen(name, arrays["valid"], start, stop)
-        valid = _pack(planes, stop - start, size, above(0.0))
-    landmarks = None
-    if "landmarks" in arrays:
-        landmarks = np.array(arrays["landmarks"], dtype=np.float64)[start:stop]
-        if not np.isfinite(landmarks).all() or landmarks[..., 2].min() < 0.0:
-            raise InputError(
-                f"{name}: landmarks must be finite numbers with confidences of 0 or "
-                "more, got others"
-            )
-    fps = rate or fps
+        known = _pack(planes, stop - start, size, above(0.0))
     numbers = first + np.arange(start, stop)
     return View(
         name=name,
         numbers=numbers,
         times=times_of(numbers, fps),
-        bits=masks,
-        known=valid,
-        usable=usable[start:stop].copy(),
+        bits=bits,
+        known=known,
+        usable=usable,
         size=size,
         fps=fps,
         counted="first" in arrays,
-        landmarks=landmarks,
+        landmarks=_stated_landmarks(name, arrays, start, stop),
         guesses=guesses,
     )
 
 
-def _stated_rate(
-    name: str, arrays: Mapping[str, Stored | NDArray[Any]]
-) -> float | None:
+def _stated_rate(name: str, arrays: Arrays) -> float | None:
     """Return the frame rate that arrays state, if any. Raises InputError if invalid."""
     if "fps" not in arrays:
         return None
@@ -235,14 +219,52 @@ def _stated_rate(
     return fps
 
 
+def _stated_first(name: str, arrays: Arrays) -> int:
+    """Return the number of the first frame that arrays state; 0 by default."""
+    first = int(np.asarray(arrays["first"])) if "first" in arrays else 0
+    if not 0 <= first <= LAST:
+        raise InputError(
+            f"{name}: first must be the number of a frame up to {LAST:,}, got {first}"
+        )
+    return first
+
+
+def _stated_usable(
+    name: str, arrays: Arrays, start: int, stop: int
+) -> NDArray[np.bool_]:
+    """Return which frames from start to stop arrays call usable; all by default.
+
+    Raises InputError if none is.
+    """
+    if "usable" not in arrays:
+        return np.ones(stop - start, dtype=bool)
+    usable = np.asarray(arrays["usable"])[start:stop].copy()
+    if not usable.any():
+        raise InputError(
+            f"{name}: expected a frame that is usable, got none from {start} to {stop}"
+        )
+    return usable
+
+
+def _stated_landmarks(name: str, arrays: Arrays, start: int, stop: int) -> Array | None:
+    """Return the landmarks of frames start to stop that arrays state, if any."""
+    if "landmarks" not in arrays:
+        return None
+    landmarks = np.array(arrays["landmarks"], dtype=np.float64)[start:stop]
+    if not np.isfinite(landmarks).all() or landmarks[..., 2].min() < 0.0:
+        raise InputError(
+            f"{name}: landmarks must be finite numbers with confidences of 0 or "
+            "more, got others"
+        )
+    return landmarks
+
+
 # height over width: a picture of a standing person may be upright, but a narrower array
 # has its axes in another order
 NARROW = 4
 
 
-def _checked_stack(
-    name: str, arrays: Mapping[str, Stored | NDArray[Any]]
-) -> Stored | NDArray[Any]:
+def _checked_stack(name: str, arrays: Arrays) -> Stored | NDArray[Any]:
     """Return the masks. Raises InputError if any array has a wrong shape or type."""
     if "masks" not in arrays:
         raise InputError(f"{name}: expected an .npz file with the key masks, got none")

@@ -18,9 +18,8 @@ from posefit.footage.people import (
     planes_of,
 )
 from posefit.footage.quality import FrameQuality
-from posefit.footage.scaled import ScaledVideo
-from posefit.footage.segmenter import PersonSegmenter
-from posefit.footage.video import Video
+from posefit.footage.segmenter import PersonSegmenter, SegmentedFrame
+from posefit.footage.video import Video, ahead
 from posefit.footage.views import Range, View, empty_planes, span, times_of
 from posefit.silhouette.foreground import Image, Person
 from posefit.silhouette.mask import touches_border
@@ -47,7 +46,6 @@ class Scanner:
         video: Video,
         how: Extraction,
         frames: Range,
-        scaled: ScaledVideo | None = None,
     ) -> None:
         """Prepare a pass.
 
@@ -55,7 +53,6 @@ class Scanner:
             video: The video.
             how: How to segment the people.
             frames: Which frames to read.
-            scaled: The video at its working size, if another pass has it already.
 
         Raises:
             InputError: The extraction or the frames do not fit the video.
@@ -63,13 +60,13 @@ class Scanner:
         """
         self.start, self.stop = span(frames, video.count())
         self.how = how
-        self.scaled = scaled or ScaledVideo(video, how.width, (self.start, self.stop))
-        self.segmenter = PersonSegmenter(self.scaled, how)
+        self.video = video
+        video.keep(self.start, self.stop)
+        self.segmenter = PersonSegmenter(video, how)
 
     def again(self) -> "Scanner":
         """Return another pass through the same frames, with a segmenter that is new."""
-        frames = (self.start, self.stop)
-        return Scanner(self.scaled.video, self.how, frames, self.scaled)
+        return Scanner(self.video, self.how, (self.start, self.stop))
 
     def scan(
         self,
@@ -84,8 +81,8 @@ class Scanner:
                 frame's index and its picture.
 
         """
-        video = self.scaled.video
-        size = self.scaled.size
+        video = self.video
+        size = video.size
         room = self.stop - self.start
         people = People(video.fps)
         camera = CameraMotion(size)
@@ -94,11 +91,11 @@ class Scanner:
         landmarks = list[Array]()
         bits = empty_planes(room, size)
         known = empty_planes(room, size)
-        images = self.scaled.frames(self.start, self.stop)
-        for k, image in enumerate(progress(images, room) if progress else images):
+        # a second core segments the next frames while people are told apart in this one
+        frames = ahead(self._segmented(changed))
+        for k, frame in enumerate(progress(frames, room) if progress else frames):
+            image, (blobs, facing, points) = frame
             camera.add(k, image)
-            given = image if changed is None else changed(k, image)
-            blobs, facing, points = self.segmenter.frame(given)
             facings.append(facing)
             landmarks.append(points)
             bits[k] = np.packbits(blobs[0].mask)
@@ -116,14 +113,25 @@ class Scanner:
             usable=np.array([row["usable"] for row in rows.largest], dtype=bool),
             size=size,
             fps=video.fps,
-            filmed=video.size,
+            filmed=video.filmed,
             landmarks=np.array(landmarks),
             facings=np.array(facings),
             moves=camera.moves,
             guesses=video.guesses,
-            pictures=partial(self.scaled.frames, self.start, self.stop),
+            pictures=partial(video.frames, self.start, self.stop),
         )
         return Scan(view, people, rows.largest, rows.blanks, self.how.person)
+
+    def _segmented(
+        self, changed: Callable[[int, Image], Image] | None
+    ) -> Iterator[tuple[Image, SegmentedFrame]]:
+        """Yield each frame's picture, and what the segmenter finds in it.
+
+        `changed` is as for `scan`.
+        """
+        for k, image in enumerate(self.video.frames(self.start, self.stop)):
+            given = image if changed is None else changed(k, image)
+            yield image, self.segmenter.frame(given)
 
 
 class _Rows:
@@ -139,6 +147,8 @@ class _Rows:
         self._scanner = scanner
         self._of_blanks = scanner.segmenter.quality()
         self._of_largest = scanner.segmenter.quality()
+        # of the people who may be in the next frame
+        self._of_people = dict[Tracklet, FrameQuality]()
 
     def add(
         self,
@@ -160,13 +170,17 @@ class _Rows:
         """
         known = blobs[0].valid
         empty = Person(np.zeros_like(known), known, 0, 0, 0.0, False)
+        qualities = dict[Tracklet, FrameQuality]()
         for tracklet in people.active:
             # a new person was in none of the earlier frames
-            tracklet.quality = tracklet.quality or deepcopy(self._of_blanks)
+            quality = self._of_people.get(tracklet) or deepcopy(self._of_blanks)
+            qualities[tracklet] = quality
             person = empty
             if tracklet in present:
                 person = _alone(tracklet, present, blobs, k)
-            tracklet.add_row(k, self._row(tracklet.quality, image, person, k))
+            tracklet.add_row(k, self._row(quality, image, person, k))
+        # those of people who are lost are freed, or memory would grow with noise
+        self._of_people = qualities
         self.blanks.append(self._row(self._of_blanks, image, empty, k))
         self.largest.append(self._row(self._of_largest, image, blobs[0], k))
 
@@ -177,7 +191,7 @@ class _Rows:
         number = self._scanner.start + k
         row = self._scanner.segmenter.row(quality, image, person, number)
         # a repeated frame does not show where the person is at its time
-        usable = row["usable"] and self._scanner.scaled.video.is_filmed(number)
+        usable = row["usable"] and self._scanner.video.is_filmed(number)
         return row | {"usable": int(usable)}
 
 

@@ -67,10 +67,9 @@ class Segmentation:
         self.video = video
         self.how = how
         self._scanner = Scanner(video, how, frames)
-        self.size = self._scanner.scaled.size
         self._all_people = None
         if among is not None:
-            self._all_people = Scanner(video, among, frames, self._scanner.scaled)
+            self._all_people = Scanner(video, among, frames)
 
     def read(
         self, progress: Progress | None = None, choose: Chooser | None = None
@@ -143,7 +142,7 @@ class Segmentation:
 
     def _follow_person(self, scan: Scan) -> _Followed:
         """Return the person who is followed. The pixels of the others are unknown."""
-        scale = 1.0 / self._scanner.scaled.scale
+        scale = 1.0 / self.video.scale
         parts, several = scan.people.chosen(
             scan.choice, lambda k: f"frame {self._scanner.start + k}", scale
         )

@@ -1,13 +1,15 @@
 """Find the people in one frame of a video after the other."""
 
 import math
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
@@ -15,11 +17,55 @@ from posefit.fitting.validation import BrokenRuleError, plugin_errors
 from posefit.footage.extraction import Box, Extraction
 from posefit.footage.images import read_image
 from posefit.footage.quality import FrameQuality
-from posefit.footage.scaled import PartOfVideo, ScaledVideo
+from posefit.footage.video import Video, scaled
 from posefit.geometry.skeleton import JOINTS
+from posefit.reading import quoted
 from posefit.registry import registry
 from posefit.silhouette.foreground import BRIGHT, Image, Person, Segmenter, people
 from posefit.silhouette.mask import Mask
+
+T = TypeVar("T", bound=np.generic)
+
+
+@dataclass(frozen=True)
+class PartOfVideo:
+    """A video as a segmenter gets it: cut to `part`."""
+
+    video: Video
+    part: Box
+
+    def __len__(self) -> int:
+        return self.video.count()
+
+    def frames(
+        self, start: int = 0, stop: int | None = None, step: int = 1
+    ) -> Iterator[Image]:
+        """Yield every `step`th frame from start to stop."""
+        return map(self.cut, self.video.frames(start, stop, step))
+
+    def picture(self, path: str) -> Image:
+        """Return a picture of the video's size, scaled and cut as the video.
+
+        Raises InputError if the file is not a picture, or has another size.
+        """
+        image = read_image(path, grey=False)
+        if image is None:
+            raise InputError(
+                f"background must be frames A:B or an image, got {quoted(path)}"
+            )
+        tall, wide = image.shape[:2]
+        width, height = self.video.filmed
+        if (wide, tall) != (width, height):
+            raise InputError(
+                f"{path}: background must have the video's size {width}x{height}, "
+                f"got {wide}x{tall}"
+            )
+        return self.cut(scaled(image, self.video.size))
+
+    def cut(self, image: NDArray[T]) -> NDArray[T]:
+        """Return the segmenter's part of an image (height, width, ...)."""
+        x, y, wide, tall = self.part
+        return np.ascontiguousarray(image[y : y + tall, x : x + wide])
 
 
 class SegmentedFrame(NamedTuple):
@@ -37,7 +83,7 @@ class PersonSegmenter:
     It learns the background from the whole video before the first frame.
     """
 
-    def __init__(self, video: ScaledVideo, how: Extraction) -> None:
+    def __init__(self, video: Video, how: Extraction) -> None:
         """Prepare a video. Raises InputError if the extraction does not fit it."""
         self.learned = "background" not in how.settings
         self._roi = _scaled_roi(how.roi, video)
@@ -72,7 +118,7 @@ class PersonSegmenter:
         """Return a new comparison of a person's masks with the pictures."""
         background = getattr(self._segmenter, "background", None)
         still = registry().offer("segmenter", self._how.name).still_background
-        return FrameQuality(self._film.scaled.video.fps, background, still=still)
+        return FrameQuality(self._film.video.fps, background, still=still)
 
     def row(
         self, quality: FrameQuality, image: Image, person: Person, number: int
@@ -123,13 +169,13 @@ class PersonSegmenter:
         return points
 
 
-def _scaled_roi(roi: Box | None, video: ScaledVideo) -> Box | None:
+def _scaled_roi(roi: Box | None, video: Video) -> Box | None:
     """Return a region in scaled pixels. Raises InputError if it leaves the video."""
     if roi is None:
         return None
     x, y, wide, tall = roi
     scale = video.scale
-    width, height = video.video.size
+    width, height = video.filmed
     if min(x, y) < 0 or min(wide, tall) < 1 or x + wide > width or y + tall > height:
         raise InputError(
             f"roi must lie within the video's {width}x{height} pixels, got {roi}"

@@ -86,8 +86,9 @@ def _of_footage(source: Resolved, options: SourceOptions, progress: Progress) ->
     # `unit` describes the calibrations if given, or else the skeleton's file
     unit = None if options.cameras else options.unit
     body, notes, of_height = body_of(options.asf, options.height, unit)
-    films = films_of(source, options.fps)
-    filmed: Sequence[tuple[int, int] | None] = [film.size for film in films]
+    how = replace(options.extraction or Extraction(), person=options.person)
+    films = films_of(source, how.width, options.fps)
+    filmed: Sequence[tuple[int, int] | None] = [film.filmed for film in films]
     filmed = filmed or [None] * len(source.places)
     known = calibrated(options.cameras, filmed, source.names)
 
@@ -95,7 +96,6 @@ def _of_footage(source: Resolved, options: SourceOptions, progress: Progress) ->
         return combined(views, body, known, options)
 
     if films:
-        how = replace(options.extraction or Extraction(), person=options.person)
         scene = _of_films(films, known, how, options.frames, progress, combine)
     else:
         views = views_of_masks(source, options.frames, options.label, options.fps)
@@ -132,16 +132,22 @@ def logged(scene: Scene, progress: Progress) -> Scene:
     return scene
 
 
-def films_of(source: Resolved, fps: float | None = None) -> list[Video]:
+def films_of(source: Resolved, width: int, fps: float | None = None) -> list[Video]:
     """Return the films of a source, one per camera; an empty list if it has masks.
 
-    `fps` is the rate of pictures. Raises InputError if a film cannot be read, or if the
-    rates differ.
+    Args:
+        source: The source.
+        width: Wider films are scaled down to this width, in pixels.
+        fps: Frames per second of pictures.
+
+    Raises:
+        InputError: A film cannot be read, or the rates differ.
+
     """
     films = list[Video]()
     for kind, place in zip(source.kinds, source.places, strict=True):
         if kind.film is not None:
-            films.append(kind.film(place, fps))
+            films.append(kind.film(place, fps, width))
     # videos that were cut or converted state rates that differ after the third decimal
     rates = sorted({round(film.fps, 3) for film in films})
     if len(rates) > 1:
@@ -211,7 +217,7 @@ def _of_films(
         # all are checked before any is read
         parts = [Segmentation(film, way, frames, among) for film in films]
         try:
-            views = _taken_out(parts, known, progress)
+            views = _segmented(parts, known, progress)
             doubts = [view.doubt for view in views if view.doubt]
             attempt = _Attempt(way.name, combine(views), doubts[0] if doubts else "")
         except NoPersonError as error:
@@ -231,7 +237,7 @@ def _of_films(
     return replace(best.scene, warnings=[*best.scene.warnings, warning])
 
 
-def _taken_out(
+def _segmented(
     parts: list[Segmentation],
     known: Sequence[Camera | Calibration],
     progress: Progress,
@@ -251,8 +257,8 @@ def _taken_out(
                 same_person,
                 [known[0], known[k]],
                 views[0],
-                part.size,
-                filmed=part.video.size,
+                part.video.size,
+                filmed=part.video.filmed,
             )
         view, _, doubt = part.read(progress.steps, choose)
         if doubt is not None and doubt.refused:

@@ -10,7 +10,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.footage.views import View, undistorted
+from posefit.footage.views import View, empty_planes
 from posefit.geometry.calibration import Calibration
 from posefit.geometry.camera import Camera
 from posefit.reading import quoted
@@ -40,6 +40,44 @@ class Straightening:
         for image in pictures():
             straight = cv2.remap(image, *self.maps, cv2.INTER_LINEAR)
             yield np.asarray(straight, dtype=np.uint8)
+
+
+def undistorted(
+    view: View,
+    calibration: Calibration,
+    maps: tuple[Any, Any],
+    straight: Camera | None = None,
+) -> View:
+    """Return a view without lens distortion, as a pinhole camera sees it.
+
+    Its landmarks are straightened, too. Pixels that the lens did not cover are unknown.
+
+    Args:
+        view: What the calibrated camera saw.
+        calibration: The calibration of that camera.
+        maps: The calibration's pixel maps from the view's size to `straight`.
+        straight: The pinhole camera. By default the calibration's, at the view's size.
+
+    Returns:
+        A view with the size of `maps`.
+
+    """
+    size = (maps[0].shape[1], maps[0].shape[0])
+    bits = empty_planes(len(view), size)
+    known = empty_planes(len(view), size)
+    for k in range(len(view)):
+        silhouette = view.silhouette(k)
+        levels = 255 * silhouette.mask.astype(np.uint8)
+        valid = silhouette.valid.astype(np.uint8)
+        share = cv2.remap(levels, *maps, cv2.INTER_LINEAR)
+        covered = cv2.remap(valid, *maps, cv2.INTER_NEAREST)
+        # interpolated between four pixels, the outline is where half of them are person
+        bits[k] = np.packbits(share > 127)
+        known[k] = np.packbits(covered != 0)
+    landmarks = view.landmarks
+    if landmarks is not None:
+        landmarks = calibration.straightened(landmarks, view.size, straight)
+    return replace(view, size=size, bits=bits, known=known, landmarks=landmarks)
 
 
 def straightening(

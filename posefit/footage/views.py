@@ -8,22 +8,16 @@ print(view.numbers[view.usable], view.silhouette(0).mask.shape)
 """
 
 import os
-from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from tempfile import TemporaryFile
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.fitting.tracker import Observation
-from posefit.geometry.calibration import Calibration
-from posefit.geometry.camera import Camera
-from posefit.geometry.skeleton import JOINTS
 from posefit.limits import allowed_bytes
 from posefit.motion.clips import FPS
 from posefit.silhouette.foreground import Image
@@ -39,10 +33,6 @@ Planes = NDArray[np.uint8]
 PLANES_BYTES = 128_000_000
 # the fields of a `View` with one row per frame; some may be None
 PER_FRAME = ("numbers", "times", "bits", "known", "usable", "landmarks", "facings")
-# cache of decoded masks: large enough for a short film
-DECODED_BYTES = 64_000_000
-# a decoded silhouette per pixel: two arrays of bytes, and two of bits
-BYTES_PER_PIXEL = 2.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +45,9 @@ class View:
 
     name: str  # name of the source, for messages
     numbers: NDArray[np.int64]  # (T,) frame numbers, as filmed
-    times: Array  # (T,) seconds, as filmed
+    # (T,) seconds since frame 0 at an even rate; of a stream, when each frame came, by
+    # the clock of `time.perf_counter`
+    times: Array
     bits: Planes = field(repr=False)  # pixels that show the person
     # pixels that are known to be person or background; None if all are
     known: Planes | None = field(repr=False)
@@ -235,148 +227,6 @@ def full_planes(count: int, size: tuple[int, int]) -> Planes:
     planes = empty_planes(count, size)
     planes[:] = np.packbits(np.ones(size[0] * size[1], dtype=bool))
     return planes
-
-
-def undistorted(
-    view: View,
-    calibration: Calibration,
-    maps: tuple[Any, Any],
-    straight: Camera | None = None,
-) -> View:
-    """Return a view without lens distortion, as a pinhole camera sees it.
-
-    Its landmarks are straightened, too. Pixels that the lens did not cover are unknown.
-
-    Args:
-        view: What the calibrated camera saw.
-        calibration: The calibration of that camera.
-        maps: The calibration's pixel maps from the view's size to `straight`.
-        straight: The pinhole camera. By default the calibration's, at the view's size.
-
-    Returns:
-        A view with the size of `maps`.
-
-    """
-    size = (maps[0].shape[1], maps[0].shape[0])
-    bits = empty_planes(len(view), size)
-    known = empty_planes(len(view), size)
-    for k in range(len(view)):
-        silhouette = view.silhouette(k)
-        levels = 255 * silhouette.mask.astype(np.uint8)
-        valid = silhouette.valid.astype(np.uint8)
-        share = cv2.remap(levels, *maps, cv2.INTER_LINEAR)
-        covered = cv2.remap(valid, *maps, cv2.INTER_NEAREST)
-        # interpolated between four pixels, the outline is where half of them are person
-        bits[k] = np.packbits(share > 127)
-        known[k] = np.packbits(covered != 0)
-    landmarks = view.landmarks
-    if landmarks is not None:
-        landmarks = calibration.straightened(landmarks, view.size, straight)
-    return replace(view, size=size, bits=bits, known=known, landmarks=landmarks)
-
-
-class Observations(Sequence[Observation]):
-    """The observations of several views of the same frames, decoded on demand.
-
-    A frame is usable if at least one camera saw enough of the person; the silhouettes
-    of the other cameras are then unknown.
-    """
-
-    def __init__(self, views: Sequence[View], yaws: Array | None = None) -> None:
-        """Pair the frames of views.
-
-        Args:
-            views: One view per camera, starting at the same frame.
-            yaws: (T,) about which way the person faces, in radians. NaN if unknown for
-                a frame; None if unknown for all.
-
-        """
-        self.views = views
-        self.yaws = np.empty(0) if yaws is None else yaws
-        self._count = min(map(len, views))
-        self.usable = np.any([view.usable[: self._count] for view in views], axis=0)
-        pixels = sum(view.size[0] * view.size[1] for view in views)
-        self._most = max(DECODED_BYTES // int(BYTES_PER_PIXEL * pixels), 1)
-        self._decoded = OrderedDict[int, list[Silhouette]]()
-
-    def __reduce__(self) -> Any:
-        return Observations, (self.views, self.yaws)
-
-    def __len__(self) -> int:
-        return self._count
-
-    def __getitem__(self, k):  # type: ignore[no-untyped-def]
-        if not 0 <= k < len(self):
-            raise IndexError(k)
-        known = k < len(self.yaws) and np.isfinite(self.yaws[k])
-        return Observation(
-            _Silhouettes(self, k),
-            usable=bool(self.usable[k]),
-            yaw=float(self.yaws[k]) if known else None,
-            landmarks=self._landmarks(k),
-        )
-
-    def _landmarks(self, k: int) -> Array | None:
-        """Return the landmarks (views, 27, 3) of frame k; None if no view has any."""
-        if all(view.landmarks is None for view in self.views):
-            return None
-        landmarks = np.zeros((len(self.views), len(JOINTS), 3))
-        for place, view in enumerate(self.views):
-            if view.landmarks is not None:
-                landmarks[place] = view.landmarks[k]
-        return landmarks
-
-    @property
-    def first(self) -> int:
-        """The first frame that is usable in all cameras, or else in any camera.
-
-        Raises InputError if no frame is usable.
-        """
-        usable = np.array([view.usable[: len(self)] for view in self.views])
-        for enough in (usable.all(axis=0), usable.any(axis=0)):
-            if enough.any():
-                return int(enough.argmax())
-        view = self.views[0]
-        raise InputError(
-            f"{view.name}, frame {view.numbers[0]}: expected a frame that is usable, "
-            "got none from there on"
-        )
-
-    def silhouettes(self, k: int) -> list[Silhouette]:
-        """Return the silhouettes of frame k, one per view. The latest are cached."""
-        kept = self._decoded.pop(k, None)
-        if kept is None:
-            kept = [self._silhouette(view, k) for view in self.views]
-        self._decoded[k] = kept
-        while len(self._decoded) > self._most:
-            self._decoded.popitem(last=False)
-        return kept
-
-    def _silhouette(self, view: View, k: int) -> Silhouette:
-        if len(self.views) > 1 and not view.usable[k]:
-            unknown = np.zeros(view.size[::-1], dtype=bool)
-            return Silhouette.of(unknown, unknown)
-        return view.silhouette(k)
-
-
-class _Silhouettes(Sequence[Silhouette]):
-    """The silhouettes of one frame, decoded on first use.
-
-    To ask whether a frame is usable decodes nothing.
-    """
-
-    def __init__(self, observations: Observations, k: int) -> None:
-        self._observations = observations
-        self._k = k
-
-    def __reduce__(self) -> Any:
-        return list, ([*self],)
-
-    def __len__(self) -> int:
-        return len(self._observations.views)
-
-    def __getitem__(self, number):  # type: ignore[no-untyped-def]
-        return self._observations.silhouettes(self._k)[number]
 
 
 def span(frames: Range, count: int, first: int = 0) -> tuple[int, int]:

@@ -1,13 +1,13 @@
 """The axes and the unit of the cameras' world."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.footage.quality import disagreement
+from posefit.footage.agreement import disagreement
 from posefit.geometry.calibration import Calibration, Up, guessed_up, upright
 from posefit.geometry.camera import Camera
 from posefit.geometry.units import METRES, UNIT_NAMES, Unit
@@ -21,6 +21,8 @@ FARTHER = 1000.0
 # metres: a camera lower than this is probably a mistake, because the world's origin is
 # usually on the floor or in the first camera
 BELOW = 1.0
+# a height of 0 or less, of a person behind a camera, would have no logarithm
+LEAST_HEIGHT = 1e-9
 
 
 def world_of(
@@ -100,6 +102,11 @@ def unit_of_heights(ratio: float) -> Unit:
     return min(GUESSED_UNITS, key=lambda unit: abs(np.log(ratio * METRES[unit])))
 
 
+def is_open(camera: Camera | Calibration) -> bool:
+    """Return whether the unit of a camera's lengths is a guess."""
+    return isinstance(camera, Calibration) and camera.scale != "metres"
+
+
 class _Fitted(NamedTuple):
     """The unit of calibrations that fits the person's height."""
 
@@ -107,9 +114,13 @@ class _Fitted(NamedTuple):
     guess: str  # what to say about it; "" if the unit guessed before fits
 
 
+# takes a factor for the lengths of calibrations whose unit is open; returns by how much
+# rays then miss each other, and the person's height in each view, as `apparent_size`
+Measured = Callable[[float], tuple[float, Array]]
+
+
 def unit_by_height(
-    miss: float,
-    tall: Array,
+    measured: Measured,
     known: Sequence[Camera | Calibration],
     metres: float,
     stature: float,
@@ -117,23 +128,29 @@ def unit_by_height(
     """Return the unit in which the person's height is about right.
 
     Args:
-        miss: By how much rays miss each other, see `apparent_sizes`.
-        tall: The person's height in each view, in the unit guessed before.
+        measured: The person's height by the factor that the lengths of calibrations
+            with an open unit are multiplied with.
         known: The cameras. A calibration may state that it is in metres, or that its
             unit may be any length if no usual one fits.
         metres: The unit guessed before, in metres.
         stature: The person's height in metres.
 
     """
-    scales = {camera.scale for camera in known if isinstance(camera, Calibration)}
-    height = float(np.median(tall))
-    # a person behind the cameras says nothing about the unit
-    unit_is_open = bool(scales - {"metres"})
-    if not (unit_is_open and height > 0.0):
+    if not any(is_open(camera) for camera in known):
         return _Fitted(1.0, "")
-    unit = unit_of_heights(height / metres / stature)
+    _, tall = measured(1.0)
+    height = float(np.median(tall))
+    all_open = all(is_open(camera) for camera in known)
+    if not all_open:
+        unit = _unit_beside_known(measured, metres, stature)
+    elif height > 0.0:
+        unit = unit_of_heights(height / metres / stature)
+    else:
+        # a person behind the cameras says nothing about the unit
+        return _Fitted(1.0, "")
     factor = METRES[unit] / metres
-    if "free" in scales and disagreement(factor * miss, factor * tall, stature):
+    is_free = any(getattr(camera, "scale", None) == "free" for camera in known)
+    if is_free and all_open and disagreement(*measured(factor), stature):
         factor = stature / height
         length = f"{factor * metres:.4g} m"
         guess = f"the calibration's unit is {length}, by the person's height"
@@ -141,3 +158,18 @@ def unit_by_height(
     if METRES[unit] == metres:
         return _Fitted(factor, "")
     return _Fitted(factor, f"the calibration is in {UNIT_NAMES[unit]}")
+
+
+def _unit_beside_known(measured: Measured, metres: float, stature: float) -> Unit:
+    """Return the unit of some calibrations, given others whose unit is known.
+
+    A wrong unit moves some cameras and not the others, so that the views disagree about
+    the person's height.
+    """
+
+    def misfit(unit: Unit) -> float:
+        _, tall = measured(METRES[unit] / metres)
+        heights = np.maximum(tall, LEAST_HEIGHT)
+        return float(np.abs(np.log(heights / stature)).max())
+
+    return min(GUESSED_UNITS, key=misfit)

@@ -7,7 +7,8 @@
 | whether two tracks have the same arguments | identity.py |
 | every file of a track, one line per format | files.py |
 | the data that the files are made of | content.py |
-| pictures: overlay.mp4 and summary.png | picture.py, drawing.py |
+| overlay.mp4, summary.png and the page, frame by frame | pictures.py |
+| the picture of one frame | picture.py, drawing.py |
 | the page, track.html | page/ |
 | the text that is printed | text.py |
 """

@@ -16,8 +16,9 @@ from posefit.fitting.carried import CARRIED, with_carried
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.output.content import Content
-from posefit.output.files import FILES, WRITERS, video_warning, write_files
+from posefit.output.files import FILES, WRITERS, write_files
 from posefit.output.identity import Digest, difference
+from posefit.output.pictures import video_warning
 from posefit.output.record import (
     append_frame,
     read_carried,

@@ -7,6 +7,7 @@ thin bones, and lost frames have a border.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple, Self
 
 import cv2
 import numpy as np
@@ -36,6 +37,7 @@ from posefit.output.drawing import (
 )
 from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Image
+from posefit.silhouette.mask import Mask
 from posefit.uncertainty.calibration import MAIN_LEVEL
 from posefit.uncertainty.modes import Mode, other_mode, other_modes
 
@@ -62,6 +64,24 @@ LINE_HEIGHT = 22  # pixels from one line to the next
 PEAK = 2.0
 PEAK_QUANTILE = 0.9
 MAX_PEAKS = 3  # this many peaks are named
+
+
+class _Certainty(NamedTuple):
+    """Whether a method calls a frame lost, and its sides unknown."""
+
+    lost: bool
+    side_unknown: bool
+
+    @classmethod
+    def of(cls, row: Row, observation: Observation) -> Self:
+        """Return the certainty of a frame by its row of the table.
+
+        A pose that was held was not searched, and the frame counts as neither, as in
+        the figures of a track.
+        """
+        searched = observation.usable
+        lost = searched and row["lost"] >= LOST
+        return cls(lost, searched and row["unknown_sides"] == 1.0)
 
 
 class Painter:
@@ -114,22 +134,59 @@ class Painter:
         solid = None if radii is None else opacities(radii[MAIN_LEVEL])
         other = other_mode(skeleton, frame.modes, frame.pose, MIN_OTHER_WEIGHT)
         image = self._panels(frame, observation, filmed, solid, other)
-        others: list[Mode] = []
+        certainty = _Certainty.of(row, observation)
         if self._scene.count == 1:
-            others = other_modes(skeleton, frame.modes, frame.pose)
-        if self._count in self._wanted:
-            share = ""
-            if others:
-                all_weights = sum(mode.weight for mode in frame.modes)
-                weight = all_weights - sum(mode.weight for mode in others)
-                share = f", {100.0 * weight:.0f} %"
-            self._stills.append(self._still(image, row, share))
+            self._add_modes(image, frame, observation, row, filmed)
+        elif self._count in self._wanted:
+            self._stills.append(self._still(image, row, certainty.lost))
+        self._write_head(image, row, observation)
+        if filmed is None or len(self._scene.cameras) > 1:
+            _write_legend(image, PANEL - 14)
+        notes = []
+        if certainty.lost:
+            notes.append(("lost", MISSED))
+        if certainty.side_unknown:
+            notes.append(("left and right unknown", OTHER))
+        if other is not None:
+            words = f"thin: may be this, {100.0 * other.weight:.0f} %"
+            notes.append((words, OTHER))
+        column = image.shape[1] - PANEL + 12
+        for k, (words, colour) in enumerate(reversed(notes)):
+            write(image, words, (column, PANEL - 14 - LINE_HEIGHT * k), colour)
+        if certainty.lost:
+            _draw_border(image, BORDER)
+        self._count += 1
+        return image
+
+    def _add_modes(
+        self,
+        image: Image,
+        frame: Frame,
+        observation: Observation,
+        row: Row,
+        filmed: Image | None,
+    ) -> None:
+        """Keep stills of all poses that a single frame may show, with their weights.
+
+        `image` shows the estimate. The others are as for `add`.
+        """
+        others = other_modes(self._scene.body.skeleton, frame.modes, frame.pose)
+        share = ""
+        if others:
+            all_weights = sum(mode.weight for mode in frame.modes)
+            weight = all_weights - sum(mode.weight for mode in others)
+            share = f", {100.0 * weight:.0f} %"
+        lost = _Certainty.of(row, observation).lost
+        self._stills.append(self._still(image, row, lost, share))
         alternatives = [mode for mode in others if mode.weight > MIN_WEIGHT]
         for mode in alternatives[:ALTERNATIVES]:
             alternative = replace(frame, pose=mode.pose, translation=mode.translation)
             still = self._panels(alternative, observation, filmed)
             words = f"or this, {100.0 * mode.weight:.0f} %"
             self._stills.append(_labelled(still, words))
+
+    def _write_head(self, image: Image, row: Row, observation: Observation) -> None:
+        """Write a frame's figures above its picture."""
         label = [
             f"frame {self._scene.first + self._count}",
             f"cost {row['cost']:.2f}",
@@ -142,25 +199,7 @@ class Painter:
         # darkened, so that the label can be read on a bright sky
         image[:LABEL_HEIGHT] //= 4
         write(image, "   ".join(label), (12, 26))
-        side_column = image.shape[1] - PANEL + 12
-        write(image, "from the camera's right", (side_column, 26))
-        if filmed is None or len(self._scene.cameras) > 1:
-            _write_legend(image, PANEL - 14)
-        lost = row["lost"] >= LOST
-        notes = []
-        if lost:
-            notes.append(("lost", MISSED))
-        if row["unknown_sides"] == 1.0:
-            notes.append(("left and right unknown", OTHER))
-        if other is not None:
-            words = f"thin: may be this, {100.0 * other.weight:.0f} %"
-            notes.append((words, OTHER))
-        for k, (words, colour) in enumerate(reversed(notes)):
-            write(image, words, (side_column, PANEL - 14 - LINE_HEIGHT * k), colour)
-        if lost:
-            _draw_border(image, BORDER)
-        self._count += 1
-        return image
+        write(image, "from the camera's right", (image.shape[1] - PANEL + 12, 26))
 
     def _panels(
         self,
@@ -181,13 +220,13 @@ class Painter:
             draw_bones(side, body, camera, other.pose, other.translation, OTHER)
         return np.hstack([self.overlay(frame, observation, filmed, solid, other), side])
 
-    def _still(self, image: Image, row: Row, weight: str) -> Image:
+    def _still(self, image: Image, row: Row, lost: bool, weight: str = "") -> Image:
         """Return a small picture below a label, which ends with the pose's `weight`."""
         quality = f"cost {row['cost']:.1f}"
         if "error_degrees" in row:
             quality = f"error {row['error_degrees']:.1f} deg"
         label = f"frame {self._scene.first + self._count}, {quality}{weight}"
-        return _labelled(image, label, row["lost"] >= LOST)
+        return _labelled(image, label, lost)
 
     def overlay(
         self,
@@ -202,41 +241,54 @@ class Painter:
         The body is drawn on the first camera's picture `filmed`, and on the masks of
         the other cameras. On masks, coloured bones show which side is left.
         """
-        body = self._scene.body
-        pose = frame.pose
-        place = frame.translation
-        height = self._panel
         panels = []
         for number, camera in enumerate(self._scene.cameras):
             if filmed is not None and number == 0:
-                drawn = filmed.copy()
-                draw_body(drawn, body, camera, pose, place, solid)
-                mixed = cv2.addWeighted(drawn, SOLID, filmed, 1.0 - SOLID, 0.0)
-                panel = panel_of(np.asarray(mixed, np.uint8), height)
-                zoomed = _zoomed(camera, panel)
+                panel = self._on_footage(camera, frame, filmed, solid)
             else:
                 mask = observation.silhouettes[number].mask
-                fitted = project(body, camera, pose, place)
-                # 0 for neither, 1 for the mask, 2 for the body, 3 for both
-                overlap = mask.view(np.uint8) + 2 * fitted.view(np.uint8)
-                numbers = panel_of(overlap, height, sharp=True)
-                # a tenth of the time that indexing with NumPy takes
-                panel = np.asarray(cv2.applyColorMap(numbers, OVERLAP), np.uint8)
-                zoomed = _zoomed(camera, panel)
-                if solid is not None:
-                    share = solid_map(body, zoomed, pose, place, solid)
-                    faint = share < 1.0
-                    share = share[faint, None]
-                    behind = (1.0 - share) * np.array(BACKGROUND)
-                    panel[faint] = share * panel[faint] + behind
-                draw_bones(panel, body, zoomed, pose, place)
+                panel = self._on_mask(camera, frame, mask, solid)
             if other is not None:
+                zoomed = _zoomed(camera, panel)
+                body = self._scene.body
                 draw_bones(panel, body, zoomed, other.pose, other.translation, OTHER)
-            panels.append(panel)
-        panels = [_padded(panel, self._widest, height) for panel in panels]
+            panels.append(_padded(panel, self._widest, self._panel))
         grid = _grid(panels, self._columns, 0)
         # the rows of seven or more cameras do not fill the height exactly
         return _padded(grid, grid.shape[1], PANEL)
+
+    def _on_footage(
+        self, camera: Camera, frame: Frame, filmed: Image, solid: Array | None
+    ) -> Image:
+        """Return a panel of the body on a picture of the footage."""
+        drawn = filmed.copy()
+        body = self._scene.body
+        draw_body(drawn, body, camera, frame.pose, frame.translation, solid)
+        mixed = cv2.addWeighted(drawn, SOLID, filmed, 1.0 - SOLID, 0.0)
+        return panel_of(np.asarray(mixed, np.uint8), self._panel)
+
+    def _on_mask(
+        self, camera: Camera, frame: Frame, mask: Mask, solid: Array | None
+    ) -> Image:
+        """Return a panel of the body and its bones on a mask."""
+        body = self._scene.body
+        pose = frame.pose
+        place = frame.translation
+        fitted = project(body, camera, pose, place)
+        # 0 for neither, 1 for the mask, 2 for the body, 3 for both
+        overlap = mask.view(np.uint8) + 2 * fitted.view(np.uint8)
+        numbers = panel_of(overlap, self._panel, sharp=True)
+        # a tenth of the time that indexing with NumPy takes
+        panel = np.asarray(cv2.applyColorMap(numbers, OVERLAP), np.uint8)
+        zoomed = _zoomed(camera, panel)
+        if solid is not None:
+            share = solid_map(body, zoomed, pose, place, solid)
+            faint = share < 1.0
+            share = share[faint, None]
+            behind = (1.0 - share) * np.array(BACKGROUND)
+            panel[faint] = share * panel[faint] + behind
+        draw_bones(panel, body, zoomed, pose, place)
+        return panel
 
     def summary(self, table: Table, notes: Sequence[str] = ()) -> Image:
         """Return the notes and stills above a curve of the track.

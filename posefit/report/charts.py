@@ -101,7 +101,8 @@ def grid(contest: Contest) -> Array:
 
     They span all traces of the contest.
     """
-    used = [used for used, _ in _traces(contest, contest.blocks) if len(used)]
+    traces: list[Trace] = contest.data("traces", contest.blocks)
+    used = [used for used, _ in traces if len(used)]
     if not used:
         return np.empty(0)
     least = min(map(np.min, used))
@@ -123,7 +124,7 @@ def convergence(contest: Contest, evaluations: Array) -> list[Line | None]:
     """
 
     def line(rows: Array) -> Line | None:
-        traces = _traces(contest, rows)
+        traces: list[Trace] = contest.data("traces", rows)
         if not all(len(used) for used, _ in traces):
             return None
         first = max(used[0] for used, _ in traces)
@@ -147,12 +148,12 @@ def joint_errors(contest: Contest) -> list[Intervals]:
 
     The list is empty if a run lacks the error of a joint.
     """
-    joints = contest.runs.data["joint_errors"][contest.blocks]  # (methods, blocks, 27)
-    if not np.isfinite(joints).all():
-        return []
     intervals = []
-    for method_errors in joints:
-        values = method_errors.T.astype(np.float64)  # (27, blocks)
+    for rows in contest.blocks:
+        joints = np.array(contest.data("joint_errors", rows))  # (blocks, 27)
+        if not np.isfinite(joints).all():
+            return []
+        values = joints.T.astype(np.float64)
         intervals.append(block_means(values, contest.instance))
     return intervals
 
@@ -180,7 +181,8 @@ def _certainty_of(contest: Contest, rows: Array) -> dict[str, Any] | None:
     figures = contest.runs.figures
     coverage = [mean(figures[f"coverage.{level}"][rows]) for level in LEVEL_NAMES]
     width = [mean(figures[f"interval_mm.{level}"][rows]) for level in LEVEL_NAMES]
-    bins = contest.runs.data["modes"][rows].sum(axis=0, dtype=np.float64)
+    modes = np.array(contest.data("modes", rows))  # (runs, bins, 3)
+    bins = modes.sum(axis=0, dtype=np.float64)
     bins = bins[bins[:, 0] > 0.0]
     if not len(bins) and None in coverage:
         return None
@@ -189,7 +191,3 @@ def _certainty_of(contest: Contest, rows: Array) -> dict[str, Any] | None:
         frames, probability, right = bins.T
         ece = float(np.abs(probability - right).sum() / frames.sum())
     return {"coverage": coverage, "width": width, "ece": ece}
-
-
-def _traces(contest: Contest, rows: Array) -> list[Trace]:
-    return [contest.runs.data["traces"][k] for k in map(int, rows.ravel())]

@@ -40,7 +40,6 @@ class Column:
         measure: Its name, label, unit, digits and meaning. The name is the same in a
             row of a ledger, in the CSV, in the report's data and on the page.
             `coverage.80` is the entry `80` of the row's `coverage`.
-        compute: Computes it from a row, if rows do not have it.
         higher_is_better: Whether a higher value is better.
         in_tables: Whether tables show it.
         optional: Whether tables show it only if some row has it. Only methods with an
@@ -49,7 +48,6 @@ class Column:
     """
 
     measure: Measure
-    compute: Callable[[Mapping[str, Any]], float] | None = None
     higher_is_better: bool = False
     in_tables: bool = True
     optional: bool = False
@@ -62,8 +60,6 @@ class Column:
 
     def value(self, row: Mapping[str, Any]) -> float:
         """Return the figure of a row, or nan if the row does not have it."""
-        if self.compute is not None:
-            return self.compute(row)
         value: Any = row
         for part in self.name.split("."):
             value = (value or {}).get(part)

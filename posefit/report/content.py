@@ -3,7 +3,7 @@
 import shlex
 import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from posefit.errors import printable
@@ -82,10 +82,6 @@ def data_of(ledger: Ledger, runs: Runs) -> dict[str, Any]:
 
 def _header(runs: Runs, contest: Contest | None) -> dict[str, Any]:
     """Return the first screen's data: the facts, and everything that limits them."""
-    dropped = []
-    for i, methods in contest.missing if contest else ():
-        missing = [runs.methods[m] for m in methods]
-        dropped.append({"instance": runs.instances[i], "missing": missing})
     failed = "no cell failed"
     if runs.failures:
         failed = f"{counted(len(runs.failures), 'cell')} failed"
@@ -103,7 +99,6 @@ def _header(runs: Runs, contest: Contest | None) -> dict[str, Any]:
     runs_words = f"{len(runs):,} {runs.kind.noun}"
     if len(runs) == 1:
         runs_words = counted(1, runs.kind.name)
-    unpaired = unpaired_sentence(contest) if contest else ""
     return {
         "version": runs.version,
         "summary": f"{runs_words} by {counted(len(runs.methods), 'method')}; {failed}.",
@@ -111,21 +106,18 @@ def _header(runs: Runs, contest: Contest | None) -> dict[str, Any]:
         "notes": _notes(runs, contest),
         "done": len(runs),
         "failed": len(runs.failures),
-        "dropped": dropped,
-        "problems": _problems(runs, dropped, unpaired),
+        "problems": _problems(runs, contest),
     }
 
 
-def _problems(
-    runs: Runs, dropped: Sequence[Mapping[str, Any]], unpaired: str
-) -> list[tuple[str, list[str]]]:
+def _problems(runs: Runs, contest: Contest | None) -> list[tuple[str, list[str]]]:
     """Return a sentence for each problem, with its most frequent details.
 
     Problems are failures, runs that are not compared, and warnings.
     """
     problems = []
 
-    def add(text: str, details: Sequence[str], most: int) -> None:
+    def add(text: str, details: Sequence[str] = (), most: int = REASONS) -> None:
         """Add a problem with at most `most` details."""
         named = list(details[:most])
         if len(details) > most:
@@ -141,24 +133,37 @@ def _problems(
         add(
             f"{failed} failed, left out of all figures: {text}",
             [f"{n} x {reason}" for reason, n in reasons.most_common()],
-            REASONS,
         )
     unfinished = [name for name in runs.failed if name not in runs.methods]
     if unfinished:
         names = "; ".join(unfinished)
-        add(f"no cell finished, so not on the leaderboard: {names}", [], 0)
-    if unpaired:
-        add(unpaired, [], 0)
-    if dropped:
+        add(f"no cell finished, so not on the leaderboard: {names}")
+    builds = {variant["version"].partition(", ")[0] for variant in runs.variants}
+    if len(builds) > 1:
+        names = "; ".join(sorted(builds))
+        add(f"methods ran with different versions: {names}")
+    if contest is not None:
+        others = []
+        for m, name in enumerate(runs.methods):
+            if m not in contest.methods:
+                others.append(name)
+        if others:
+            add(
+                "too few runs in common with the others, so not compared; the "
+                f"leaderboard has the means of all their runs: {'; '.join(others)}"
+            )
+        if unpaired := unpaired_sentence(contest):
+            add(unpaired)
         details = []
-        for gap in dropped:
+        for i, methods in contest.missing:
             why = "no seed in common"
-            if gap["missing"]:
-                why = f"no run of {'; '.join(gap['missing'])}"
-            details.append(f"{gap['instance']}: {why}")
-        instances = counted(len(dropped), "instance")
-        text = f"left out of the comparison, for every method: {instances}"
-        add(text, details, MAX_MISSING)
+            if methods:
+                why = f"no run of {'; '.join(runs.methods[m] for m in methods)}"
+            details.append(f"{runs.instances[i]}: {why}")
+        if details:
+            instances = counted(len(details), "instance")
+            text = f"left out of the comparison, for every method: {instances}"
+            add(text, details, MAX_MISSING)
     if runs.warnings:
         warnings: Counter[str] = Counter()
         for texts in runs.warnings.values():
@@ -166,7 +171,6 @@ def _problems(
         add(
             f"{counted(len(runs.warnings), 'run')} with a warning",
             [f"{n} x {warning}" for warning, n in warnings.most_common()],
-            REASONS,
         )
     return problems
 
@@ -181,16 +185,6 @@ def _notes(runs: Runs, contest: Contest | None) -> list[str]:
             notes.append(
                 f"Methods are compared on the {size:,} of {len(runs):,} runs that all "
                 f"of them share: {instances} with {contest.seed_words}."
-            )
-        others = []
-        for m, name in enumerate(runs.methods):
-            if m not in contest.methods:
-                others.append(name)
-        if others:
-            notes.append(
-                "Too few runs in common with the others, so not compared: "
-                f"{'; '.join(others)}. "
-                "Their rows of the leaderboard use their own runs."
             )
     budget = (
         "Budgets differ: compare methods of one budget only, as a longer search has "

@@ -43,6 +43,10 @@ class Kind(Protocol):
     data: tuple[str, ...]
     baselines: Mapping[str, str]
 
+    def computed(self, row: Row, /) -> dict[str, float]:
+        """Return the figures that a row of a ledger does not have itself."""
+        ...
+
     def read(
         self, row: Row, shared: dict[bytes, Any], /
     ) -> tuple[Array, tuple[Any, ...]]:
@@ -113,8 +117,7 @@ class Runs:
         seeds: The seeds, rising.
         keys: The key of each row.
         figures: Each figure (n,) by name, nan if a row does not have it.
-        data: The other data of each row, an array or a tuple, by the names of
-            `Kind.data`.
+        data: The other data of each row, by the names of `Kind.data`.
         warnings: The warnings of each row that has some, by its index.
         failures: The name, method, key, reasons and command of each quarantined cell.
     """
@@ -131,7 +134,7 @@ class Runs:
     seeds: tuple[int, ...]
     keys: tuple[str, ...]
     figures: dict[str, Array]
-    data: dict[str, Any]
+    data: dict[str, Sequence[Any]]
     warnings: Mapping[int, tuple[str, ...]]
     failures: tuple[dict[str, Any], ...]
 
@@ -186,6 +189,11 @@ class Contest(Shared):
     def scores(self) -> Array:
         """The figure (methods, blocks) that orders the methods."""
         return self.of(self.runs.kind.score.name)
+
+    def data(self, name: str, rows: Array | NDArray[np.int64]) -> list[Any]:
+        """Return the other data of rows, which are indices of any shape, in order."""
+        data = self.runs.data[name]
+        return [data[k] for k in map(int, rows.ravel())]
 
     def rows_of(self, method: int) -> NDArray[np.int64]:
         """Return the indices (k,) of the runs on which a method's figures are averaged.

@@ -1,10 +1,10 @@
 """Figures for papers, drawn by matplotlib (posefit[figures]), and their folder."""
 
-import importlib
 import os
 from collections.abc import Sequence
+from operator import itemgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from posefit.errors import InputError
 from posefit.files import Unfinished, other_entries
@@ -28,7 +28,7 @@ TABLE = "leaderboard.csv"
 TABLE_MARK = b"method,settings,"
 CHARTS = ("leaderboard", "convergence", "profile")
 NAMES = (*(f"{chart}.{kind}" for chart in CHARTS for kind in ("png", "pdf")), TABLE)
-_SIZE = (6.4, 3.6)  # inches
+WIDTH = 6.4  # inches
 
 
 def save(figure: "Figure", path: Path) -> None:
@@ -56,7 +56,7 @@ def chart_figure(
     Raises:
         ImportError: matplotlib is not installed.
     """
-    figure: Figure = library("figure").Figure(figsize=_SIZE, layout="constrained")
+    figure = empty_figure()
     axes = figure.add_subplot(xlabel=chart.x_label, ylabel=chart.y_label)
     axes.spines[["top", "right"]].set_visible(False)
     for k in order:
@@ -112,10 +112,10 @@ def board_figure(
         ImportError: matplotlib is not installed.
     """
     rows = [row for row in board if row[score.name] is not None]
-    height = 0.9 + 0.3 * len(rows)
-    figure: Figure = library("figure").Figure(
-        figsize=(_SIZE[0], height), layout="constrained"
-    )
+    height = 0.9 + 0.3 * len(rows) + 0.15 * len(baselines)
+    bottom = len(rows) - 0.5
+    top = -0.6
+    figure = empty_figure(height)
     axes = figure.add_subplot(xlabel=score.axis)
     axes.spines[["top", "right", "left"]].set_visible(False)
     axes.tick_params(axis="y", length=0)
@@ -125,33 +125,31 @@ def board_figure(
             axes.plot([row["low"], row["high"]], [place, place], color=colour)
         marker = MARKERS[row["method"] % len(MARKERS)]
         axes.plot(row[score.name], place, marker=marker, color=colour)
-    for name, value in baselines:
-        axes.axvline(value, color="0.5", linestyle=":", linewidth=1.0)
-        axes.annotate(
-            _plain(name),
-            (value, -0.6),
-            rotation=25,
-            fontsize=7,
-            color="0.35",
-            annotation_clip=False,
+    # each name is above the one to the left, because baselines may be close together
+    for name, value in sorted(baselines, key=itemgetter(1)):
+        top -= 0.5
+        axes.plot(
+            [value, value], [top, bottom], color="0.5", linestyle=":", lw=1.0, zorder=0
         )
+        axes.text(value, top, f" {_plain(name)}", va="top", fontsize=7, color="0.35")
     axes.set_yticks(range(len(rows)), [_plain(row["name"]) for row in rows])
-    axes.set_ylim(len(rows) - 0.5, -0.6)
+    axes.set_ylim(bottom, top)
     axes.set_xlim(left=0.0)
     return figure
 
 
-def library(name: str) -> Any:
-    """Return a module of matplotlib, or matplotlib itself for an empty name.
+def empty_figure(height: float = 3.6) -> "Figure":
+    """Return a figure of this height in inches.
 
     Raises ImportError if matplotlib is not installed.
     """
     try:
-        return importlib.import_module(f"matplotlib.{name}" if name else "matplotlib")
+        from matplotlib.figure import Figure
     except ImportError as error:
         raise ImportError(
             "figures need the library matplotlib: pip install posefit[figures]"
         ) from error
+    return Figure(figsize=(WIDTH, height), layout="constrained")
 
 
 def check_folder(path: str | Path) -> None:

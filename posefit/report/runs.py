@@ -132,35 +132,34 @@ def runs_of(
     """
     rows = _Rows(ledger)
     kind = rows.kind
-    figures = np.array(rows.figures).reshape(-1, len(kind.columns))
-    method_of_row = np.array(rows.method, dtype=int)
-    place_of_row = np.array(rows.place, dtype=int)
+    figures = np.asarray(rows.figures).reshape(-1, len(kind.columns))
     score = figures[:, list(kind.columns).index(kind.score.name)]
-    label_of = _labels(rows, method_of_row, score, latest)
+    label_of = _labels(rows, score, latest)
     chosen = _named(methods, label_of, rows) if methods else list(label_of)
     finished = [m for m in chosen if m < rows.finished_methods]
 
     # the rows of these methods, sorted by instance, method and seed
-    method = _positions(finished, len(rows.methods.values))[method_of_row]
-    retained = np.flatnonzero(method >= 0)
+    retained = set(finished)
+    numbers = [k for k, m in enumerate(rows.method) if m in retained]
     places = rows.places.values
     place_order = sorted(
-        np.unique(place_of_row[retained]).tolist(),
+        {rows.place[k] for k in numbers},
         key=lambda i: (kind.rank(places[i]), _text(places[i])),
     )
-    instance = _positions(place_order, len(places))[place_of_row]
-    retained_seeds = np.array([rows.seeds[k] for k in retained], dtype=object)
-    seeds, seed = np.unique(retained_seeds, return_inverse=True)
-    order = np.lexsort((seed, method[retained], instance[retained]))
-    numbers = retained[order].tolist()
+    seeds = sorted({rows.seeds[k] for k in numbers})
+
+    def ranks(values: Sequence[int], order: Sequence[int]) -> "Array":
+        """Return the places of these rows' values in an order."""
+        rank = {value: place for place, value in enumerate(order)}
+        return np.array([rank[values[k]] for k in numbers], dtype=int)
+
+    instance = ranks(rows.place, place_order)
+    method = ranks(rows.method, finished)
+    seed = ranks(rows.seeds, seeds)
+    order = np.lexsort((seed, method, instance))
+    numbers = [numbers[k] for k in order.tolist()]
 
     columns = zip(*(rows.data[k] for k in numbers), strict=True)
-    data: dict[str, Any] = {}
-    # without rows there are no columns
-    for name, column in zip(kind.data, columns, strict=False):
-        data[name] = column
-        if isinstance(column[0], np.ndarray):
-            data[name] = np.array(column)
     warnings = {}
     for place, k in enumerate(numbers):
         if rows.warnings[k]:
@@ -176,26 +175,26 @@ def runs_of(
         variants=tuple(rows.methods.values[m] for m in finished),
         instances=_instance_names(kind, [places[i] for i in place_order]),
         places=tuple(places[i] for i in place_order),
-        method=method[numbers],
-        instance=instance[numbers],
-        seed=seed[order],  # type: ignore[arg-type]
-        seeds=tuple(seeds.tolist()),
+        method=method[order],
+        instance=instance[order],
+        seed=seed[order],
+        seeds=tuple(seeds),
         keys=tuple(rows.keys[k] for k in numbers),
         figures=dict(zip(kind.columns, figures[numbers].T, strict=True)),
-        data=data,
+        # without rows there are no columns
+        data=dict(zip(kind.data, columns, strict=False)),
         warnings=warnings,
         failures=tuple(failures),
     )
 
 
-def _labels(
-    rows: _Rows, method: "Array", score: "Array", latest: bool
-) -> dict[int, str]:
+def _labels(rows: _Rows, score: "Array", latest: bool) -> dict[int, str]:
     """Return the distinct names of methods by their numbers, the best first.
 
     Methods that only failed are last.
     """
     variants = rows.methods.values
+    method = np.array(rows.method)
     badness = np.nan_to_num(-score if rows.kind.score.down else score, nan=np.inf)
     means = [badness[method == m].mean() for m in range(rows.finished_methods)]
     means += [np.inf] * (len(variants) - len(means))
@@ -220,13 +219,6 @@ def _instance_names(kind: Kind, places: Sequence[dict[str, Any]]) -> tuple[str, 
                 unnamed[name] = _text(value).strip('"')
         details.append(unnamed)
     return distinct([kind.place_name(place) for place in places], details)
-
-
-def _positions(order: Sequence[int], count: int) -> "Array":
-    """Return the position (count,) of each number in an order, -1 if it is absent."""
-    positions = np.full(count, -1)
-    positions[list(order)] = np.arange(len(order))
-    return positions
 
 
 def _latest(variants: Sequence[Mapping[str, Any]]) -> list[int]:
@@ -296,10 +288,8 @@ def _variation(variant: Mapping[str, Any]) -> dict[str, str]:
         if name in variant:
             value = variant[name]
             texts[name] = value if isinstance(value, str) else f"{value:.12g}"
-    posefit, *plugins = variant["version"].split(", ")
-    texts["posefit"] = posefit
-    for plugin in plugins:
-        name, _, version = plugin.partition(" ")
+    for part in variant["version"].split(", "):
+        name, _, version = part.partition(" ")
         texts[name] = version
     return texts
 

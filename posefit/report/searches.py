@@ -10,7 +10,7 @@ from posefit.arrays import Array
 from posefit.evaluation.measures import Measure
 from posefit.reading import counted
 from posefit.report.charts import Chart, Line
-from posefit.report.columns import Column, Score, listed, mean, median
+from posefit.report.columns import Column, Score, listed, median
 from posefit.report.contest import Contest, Place, Row, Runs
 from posefit.statistics.means import mean_intervals
 from posefit.statistics.profiles import attained, hits
@@ -31,15 +31,6 @@ def _hits(run: SuiteRun) -> Array:
     return hits((run.evaluations, run.costs), run.targets)
 
 
-def _reached(row: Row) -> float:
-    return 100.0 * float(np.isfinite(_hits(search_run(row))).mean())
-
-
-def _above(row: Row) -> float:
-    run = search_run(row)
-    return run.cost - run.truth_cost
-
-
 _REACHED = Measure(
     "reached", "targets", "%", 1, "Share of all runs and targets that were reached"
 )
@@ -47,8 +38,8 @@ _ABOVE = Measure(
     "above", "above", "", 2, "Median of the best costs above the true pose's"
 )
 COLUMNS = {
-    "reached": Column(_REACHED, _reached, higher_is_better=True, average=mean),
-    "above": Column(_ABOVE, _above, average=median),
+    "reached": Column(_REACHED, higher_is_better=True),
+    "above": Column(_ABOVE, average=median),
 }
 SCORE = Score(
     name="reached",
@@ -81,11 +72,16 @@ class Searches:
     data: tuple[str, ...] = ("runs", "hits")
     baselines: Mapping[str, str] = {RANDOM: "random search"}
 
+    def computed(self, row: Row, /) -> dict[str, float]:
+        """Return the share of targets that a row reached, and its cost above."""
+        run = search_run(row)
+        reached = 100.0 * float(np.isfinite(_hits(run)).mean())
+        return {"reached": reached, "above": run.cost - run.truth_cost}
+
     def read(self, row: Row, _: dict[bytes, Any], /) -> tuple[Array, tuple[Any, ...]]:
         """Return the figures of a row, its run, and its evaluations to each target."""
         run = search_run(row)
-        figures = np.array([column.value(row) for column in COLUMNS.values()])
-        return figures, (run, _hits(run))
+        return np.array(list(self.computed(row).values())), (run, _hits(run))
 
     def rank(self, place: Place) -> tuple[Any, ...]:
         """Return the key by which instances are sorted."""
@@ -201,10 +197,11 @@ def search_charts(contest: Contest) -> list[Chart]:
     functions = contest.place_field("function")
     dimensions = contest.place_field("dimension")
     instances = contest.place_field("instance")
-    runs = [contest.runs.data["runs"][k] for k in map(int, contest.blocks.ravel())]
+    runs = contest.data("runs", contest.blocks)
     most = max(float(run.evaluations[-1]) / run.dimension for run in runs)
     evaluations = np.unique(np.geomspace(1.0, max(most, 1.0), POINTS))
-    hits_of_runs = contest.runs.data["hits"][contest.blocks]
+    hits_of_runs = np.array(contest.data("hits", contest.blocks))
+    hits_of_runs = hits_of_runs.reshape(*contest.blocks.shape, -1)
     hits_of_runs = hits_of_runs / dimensions.astype(np.float64)[None, :, None]
     # (methods, blocks, points)
     shares = np.array(
@@ -246,11 +243,10 @@ def running_times(contest: Contest) -> list[dict[str, Any]]:
     There is no row for all functions together, because the hardest function would
     decide its mean running time.
     """
-    runs = contest.runs.data["runs"]
     rows = []
     for method in contest.methods:
-        runs_of_method = [runs[k] for k in contest.rows_of(method).tolist()]
-        for score in suite_scores(runs_of_method):
+        runs = contest.data("runs", contest.rows_of(method))
+        for score in suite_scores(runs):
             if score.function == ALL:
                 continue
             row = {

@@ -7,7 +7,7 @@ from posefit.errors import printable
 from posefit.reading import counted
 from posefit.report.columns import listed, p_text
 from posefit.report.contest import Contest, Row
-from posefit.statistics.paired import POWER, SIGNIFICANCE
+from posefit.statistics.paired import POWER, SIGNIFICANCE, fewest_blocks
 
 # If a difference would take more seeds or instances, the methods are practically equal.
 MAX_NEEDED = 1000
@@ -50,7 +50,7 @@ def leader_sentences(
             better.append(row)
     facts = f"{_value(contest, first)} on {where}"
     if worse:
-        text = f"{first['name']} {facts}; it leads {_led(contest, worse, others)}."
+        text = f"{first['name']} {facts}; it leads {_led(contest, worse)}."
     elif tested:
         text = f"No method leads; {first['name']}, which comes first, {facts}."
     else:
@@ -62,7 +62,7 @@ def leader_sentences(
     if unclear:
         effects = listed([_effect(contest, row) for row in unclear])
         sentences.append(f"No difference is shown from {effects}.")
-        sentences.append(_power(contest, unclear))
+        sentences += _power(contest, unclear)
     if not others:
         sentences.append("No other method shares its runs.")
     elif not tested:
@@ -85,28 +85,30 @@ def _value(contest: Contest, row: Row) -> str:
     return f"lost frames in {lost} of {counted(row['runs'], 'track')} and {value}"
 
 
-def _led(contest: Contest, worse: Sequence[Row], others: Sequence[Row]) -> str:
+def _led(contest: Contest, worse: Sequence[Row]) -> str:
     """Return the methods that are shown to be worse; the nearest has its difference."""
     score = contest.runs.kind.score
-    rising = sorted(worse, key=lambda row: float(row["behind"]))
-    nearest = rising[0]
-    details = [p_text(nearest["p"])]
-    if math.isfinite(nearest["behind_low"]):
-        low = score.amount(nearest["behind_low"])
-        details.insert(0, f"{low} to {score.amount(nearest['behind_high'])}")
-    effect = f"by {score.amount(nearest['behind'])} ({', '.join(details)})"
-    if len(worse) == 1:
-        return f"{nearest['name']} {effect}"
-    if len(worse) == len(others):
-        count = "both" if len(others) == 2 else f"all {len(others)}"
-        return f"{count} others, the nearest of them, {nearest['name']}, {effect}"
-    names = listed([row["name"] for row in rising[1:]])
-    return f"{nearest['name']} {effect}, and {names} by more"
+    nearest, *more = sorted(worse, key=lambda row: float(row["behind"]))
+    low = score.amount(nearest["behind_low"])
+    high = score.amount(nearest["behind_high"])
+    text = (
+        f"{nearest['name']} by {score.amount(nearest['behind'])} "
+        f"({low} to {high}, {p_text(nearest['p'])})"
+    )
+    if not more:
+        return text
+    names = listed([row["name"] for row in more])
+    p = p_text(max(row["p"] for row in more))
+    if len(more) > 1:
+        p = p.replace("=", "at most")
+    return f"{text}, and {names} by more ({p})"
 
 
 def _effect(contest: Contest, row: Row) -> str:
     """Return a method's name, difference from the first, interval, p and losses."""
     score = contest.runs.kind.score
+    if row["behind_low"] == row["behind_high"] == 0.0:
+        return f"{row['name']} (equal in all {score.paired})"
     details = [score.difference(row["behind"])]
     if math.isfinite(row["behind_low"]):
         low = score.difference(row["behind_low"])
@@ -117,25 +119,38 @@ def _effect(contest: Contest, row: Row) -> str:
     return f"{row['name']} ({', '.join(details)})"
 
 
-def _power(contest: Contest, unclear: Sequence[Row]) -> str:
-    """Return a sentence about how many runs would show the differences."""
+def _power(contest: Contest, unclear: Sequence[Row]) -> list[str]:
+    """Return a sentence about how many runs would show the differences.
+
+    There is none about methods that are equal in all runs.
+    """
     score = contest.runs.kind.score
     nearest = min(unclear, key=lambda row: float(row["blocks_needed"]))
     needed = nearest["blocks_needed"]
+    methods, blocks = contest.tested_errors.shape[:2]
+    fewest = fewest_blocks(len(contest.comparisons))
+    # the spread of so few runs says little, so nothing is computed from it
+    if blocks < fewest:
+        return [
+            f"{blocks} paired {score.paired} cannot show a difference between "
+            f"{methods} methods: that takes at least {fewest}."
+        ]
+    if all(row["behind_low"] == row["behind_high"] for row in unclear):
+        return []
     unit = "instances"
     if score.paired == "runs":
         needed = needed / len(contest.instances)
         unit = "seeds of each instance"
     # a difference of nearly 0 would need millions of runs, a number that misleads
     if needed > MAX_NEEDED:
-        return (
+        return [
             f"Not even {MAX_NEEDED:,} {unit} would show differences as small as these."
-        )
-    return (
+        ]
+    return [
         f"If the difference from {nearest['name']} is real, about "
         f"{math.ceil(needed):,} {unit} would show it, "
         f"with a probability of {100 * POWER:.0f} %."
-    )
+    ]
 
 
 def unpaired_sentence(contest: Contest) -> str:

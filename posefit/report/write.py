@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from posefit.errors import InputError
-from posefit.files import check_new, check_place, replaceable, replaced_file
+from posefit.files import check_new, check_place, check_replaceable, replaced_file
 from posefit.page.document import plain
 from posefit.reading import cut
 from posefit.report.coco import write_coco
@@ -58,16 +58,19 @@ def write_report(
         ImportError: Figures are asked for, and matplotlib is not installed.
     """
     paths = [path] if isinstance(path, str | Path) else path
-    files = [(out, MARK), (csv, CSV_MARK), (latex, LATEX_MARK)]
-    _check_files(files)
+    if out is not None and Path(out).suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"--out must be a file that ends in .html, got {cut(out)}")
+    for file, mark in ((out, MARK), (csv, CSV_MARK), (latex, LATEX_MARK)):
+        if file is not None:
+            check_replaceable(file, mark.encode())
     _check_distinct(Path(paths[0]), [out, figures, csv, latex, coco])
     if coco is not None:
         check_new(coco)
     if figures is not None:
-        from posefit.report.figures import check_folder, library, write_figures
+        from posefit.report.figures import check_folder, empty_figure, write_figures
 
         check_folder(figures)
-        library("figure")
+        empty_figure()
     with Ledger(*paths) as ledger:
         runs = runs_of(ledger, methods, latest=latest)
         if runs.kind.name == "search" and figures is not None:
@@ -141,30 +144,8 @@ def _csv_rows(ledger: Ledger, kind: Kind) -> Iterator[dict[str, Any]]:
     for row in ledger.all_rows():
         columns = flat(row)
         if row["status"] == "done":
-            for column in kind.columns.values():
-                if column.compute is not None:
-                    columns[column.name] = column.value(row)
+            columns |= kind.computed(row)
         yield {**columns, "command": repeat_command(row["spec"])}
-
-
-def _check_files(files: Sequence[tuple[str | None, str]]) -> None:
-    """Raise InputError if a path exists and is not an earlier file of the same kind.
-
-    An earlier file begins with the mark of its kind.
-    """
-    for place, mark in files:
-        if place is None:
-            continue
-        is_page = mark == MARK
-        if is_page and Path(place).suffix.lower() not in (".html", ".htm"):
-            raise InputError(
-                f"--out must be a file that ends in .html, got {cut(place)}"
-            )
-        if not replaceable(place, mark.encode()):
-            earlier = "an earlier report" if is_page else "an earlier file of this kind"
-            raise InputError(
-                f"{place}: expected a new name or {earlier}, got something else"
-            )
 
 
 def _check_distinct(ledger: Path, places: Sequence[str | None]) -> None:

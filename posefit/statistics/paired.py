@@ -133,9 +133,20 @@ def _blocks_needed(means: Array, spreads: Array) -> Array:
     reach = stats.norm.ppf(1.0 - level / 2.0) + stats.norm.ppf(POWER)
     with np.errstate(divide="ignore", invalid="ignore"):
         by_spread = np.ceil((reach * spreads / means) ** 2)
-    # the lowest p of n blocks, 2 / 2^n, must be below the level, too
-    by_signs = math.ceil(1.0 - math.log2(level))
-    return np.where(means == 0.0, np.inf, np.maximum(by_spread, by_signs))
+    fewest = fewest_blocks(len(means))
+    return np.where(means == 0.0, np.inf, np.maximum(by_spread, fewest))
+
+
+def fewest_blocks(comparisons: int) -> int:
+    """Return the fewest blocks that can show a difference among some comparisons.
+
+    The lowest p of n blocks, 2 / 2^n, must be below Bonferroni's level.
+
+    >>> fewest_blocks(1)
+    6
+
+    """
+    return math.ceil(1.0 - math.log2(SIGNIFICANCE / comparisons))
 
 
 def holm(p_values: ArrayLike) -> Array:

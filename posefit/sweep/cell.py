@@ -18,7 +18,6 @@ from posefit.version import posefit_build
 
 if TYPE_CHECKING:
     from posefit.footage.scene import Scene
-    from posefit.registry import Offer
 
 ALL_AROUND = 180.0  # degrees; with an error this large the yaw is unknown
 RNG_STREAM_PERSON = 2001  # of the errors in a method's knowledge of the person
@@ -328,17 +327,8 @@ def run_cell(cell: Cell) -> dict[str, Any]:
 
 def foreign_plugins(version: str) -> str:
     """Return the part of a cell's version that is about plugins from elsewhere."""
-    own = _own_origins()
-    return ", ".join(part for part in version.split(", ") if part not in own)
-
-
-@lru_cache(maxsize=1)
-def _own_origins() -> frozenset[str]:
-    """Return the origins of posefit and its own plugins."""
-    from posefit.hooks import PROJECT
-
-    own = [offer.origin for offer in _offers() if offer.distribution == PROJECT]
-    return frozenset([posefit_build(), *own])
+    origins = installed()
+    return ", ".join(part for part in version.split(", ") if not origins.get(part))
 
 
 def other_version(origin: str) -> str | None:
@@ -363,19 +353,19 @@ def other_version(origin: str) -> str | None:
 
 
 @lru_cache(maxsize=1)
-def installed() -> frozenset[str]:
-    """Return the origins of posefit and all installed plugins.
+def installed() -> dict[str, bool]:
+    """Return the origins of posefit and all plugins, and whether each is posefit's own.
 
     See `posefit.registry.Offer.origin`.
     """
-    return frozenset([posefit_build(), *(offer.origin for offer in _offers())])
-
-
-def _offers() -> list["Offer"]:
-    """Return what all plugins offer."""
+    from posefit.hooks import PROJECT
     from posefit.registry import registry
 
-    return [offer for named in registry().offers.values() for offer in named.values()]
+    origins = {posefit_build(): True}
+    for named in registry().offers.values():
+        for offer in named.values():
+            origins[offer.origin] = offer.distribution == PROJECT
+    return origins
 
 
 def cell_scene(cell: TrackCell) -> "Scene":

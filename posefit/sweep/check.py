@@ -68,7 +68,8 @@ def cell_of(spec: Mapping[str, Any]) -> TrackCell:
             raise InputError(f"a cell must have a {name}, got none")
     values = _checked(spec, CHECKS)
     texts = tuple(settings.settings_text(values.get("settings", {})))
-    offers, chosen = _of_method(values["method"], texts)
+    evaluations = values.get("evaluations", TrackCell.evaluations)
+    chosen, version = _of_method(values["method"], texts, evaluations)
     train = values.get("train") or _other_styles(values["motion"])
     if values["motion"] in train:
         raise InputError(
@@ -77,7 +78,6 @@ def cell_of(spec: Mapping[str, Any]) -> TrackCell:
     files: dict[str, str] = {}
     for motion in (values["motion"], *train):
         files.update(_files(motion))
-    version = version_of(offer.origin for offer in offers)
     cell = TrackCell(
         **{
             **values,
@@ -87,11 +87,6 @@ def cell_of(spec: Mapping[str, Any]) -> TrackCell:
             "version": version,
         }
     )
-    size = _population(cell.method, texts, cell.evaluations)
-    if size > cell.evaluations:
-        raise InputError(
-            f"evaluations must hold one population of {size}, got {cell.evaluations}"
-        )
     # only a motion that is read from a file has a length
     if files.get(cell.motion):
         length = _length(cell.motion, cell.fps)
@@ -155,7 +150,6 @@ def forget() -> None:
         _offers,
         _of_method,
         _of_search,
-        _population,
         _other_styles,
         _files,
         _length,
@@ -199,19 +193,23 @@ def _offers(method: str) -> tuple[Offer, ...]:
 
 @lru_cache(maxsize=1024)
 def _of_method(
-    method: str, texts: tuple[str, ...]
-) -> tuple[tuple[Offer, ...], dict[str, Any]]:
-    """Return a method's plugins and its settings, sorted by name, with their types.
+    method: str, texts: tuple[str, ...], evaluations: int
+) -> tuple[dict[str, Any], str]:
+    """Return a method's settings, sorted by name, with their types, and its version.
 
-    `texts` are settings such as `sapso.cooling=0.9`.
+    `texts` are settings such as `sapso.cooling=0.9`. Raises InputError if one
+    population takes more evaluations than there are.
     """
     offers = _offers(method)
-    names = {kind: name for name, (kind, _) in places_of(offers).items()}
+    chosen = parsed_settings(offers, texts)
     named: dict[str, Any] = {}
-    for kind, values in parsed_settings(offers, texts).items():
-        for setting, value in values.items():
-            named[f"{names[kind]}.{setting}"] = value
-    return offers, dict(sorted(named.items()))
+    for name, (kind, _) in places_of(offers).items():
+        for setting, value in chosen[kind].items():
+            named[f"{name}.{setting}"] = value
+    if offers[0].kind == "optimiser":
+        _check_population(offers[0], chosen["optimiser"], evaluations)
+    version = version_of(offer.origin for offer in offers)
+    return dict(sorted(named.items())), version
 
 
 @lru_cache(maxsize=1024)
@@ -222,24 +220,17 @@ def _of_search(method: str, chosen: str, evaluations: int) -> str:
     these settings takes more evaluations than there are.
     """
     offer = registry().offer("optimiser", method)
-    size = settings.population(offer.factory, json.loads(chosen), evaluations)
-    if size > evaluations:
-        raise InputError(
-            f"evaluations must hold one population of {size}, "
-            f"got {evaluations} of {method}"
-        )
+    _check_population(offer, json.loads(chosen), evaluations)
     return version_of([offer.origin])
 
 
-@lru_cache(maxsize=1024)
-def _population(method: str, texts: tuple[str, ...], evaluations: int) -> int:
-    """Return an optimiser's population size if it has such a setting, else 1."""
-    offers = _offers(method)
-    offer = offers[0]
-    if offer.kind != "optimiser":
-        return 1
-    chosen = parsed_settings(offers, texts)["optimiser"]
-    return settings.population(offer.factory, chosen, evaluations)
+def _check_population(offer: Offer, chosen: Mapping[str, Any], most: int) -> None:
+    size = settings.population(offer.factory, chosen, most)
+    if size > most:
+        raise InputError(
+            f"evaluations must hold one population of {size}, "
+            f"got {most} of {offer.name}"
+        )
 
 
 @lru_cache(maxsize=1024)

@@ -9,6 +9,7 @@ import multiprocessing
 import pickle
 import secrets
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import partial
 from typing import Any
@@ -98,12 +99,13 @@ class Cluster:
             ) from None
 
     def window(self) -> int:
-        """Return the number of threads of all workers, but at least one.
+        """Return twice the number of threads of all workers, but at least one.
 
-        Dask keeps a job while there are no workers.
+        A worker that ends a job then has the next one already. Dask keeps a job while
+        there are no workers.
         """
         try:
-            return max(1, int(sum(self._client.nthreads().values())))
+            return max(1, 2 * int(sum(self._client.nthreads().values())))
         # raised by a client whose scheduler went away
         except (OSError, TimeoutError, ValueError, AttributeError):
             raise InputError(
@@ -132,12 +134,12 @@ class Cluster:
                 futures = tuple(self._running)
                 wait: Any = self._distributed.wait
                 wait(futures, seconds, "FIRST_COMPLETED")
-        outcomes = []
-        # a copy, because `_outcome` removes the job from `_running`
-        for future in tuple(self._running):
-            if future.done():
-                outcomes.append(self._outcome(future))
-        return outcomes
+        done = [future for future in self._running if future.done()]
+        if not done:
+            return []
+        # side by side, because the way to a worker and back takes time
+        with ThreadPoolExecutor(len(done)) as threads:
+            return list(threads.map(self._outcome, done))
 
     def close(self) -> None:
         """Leave the scheduler."""

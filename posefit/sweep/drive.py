@@ -61,7 +61,8 @@ def drive(
             while len(stop_requests) < 2 and (
                 running or (waiting and not stop_requests)
             ):
-                while waiting and not stop_requests and len(running) < engine.window():
+                window = engine.window()
+                while waiting and not stop_requests and len(running) < window:
                     place = waiting.popleft()
                     cell = ledger.cell(place)
                     running[cell.key] = place

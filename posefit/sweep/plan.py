@@ -11,7 +11,7 @@ but no table around them.
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib.resources import files
-from itertools import chain, combinations, product
+from itertools import chain, product
 from math import prod
 from pathlib import Path
 from typing import Any, Self
@@ -171,17 +171,14 @@ def _tracks(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
     lists = {}
     for name, values in crossed.items():
         lists[LISTS[name]] = _listed(f"product.{name}", LISTS[name], values)
-    names = []
+    said: set[str] = set()
     for field, entries in lists.items():
-        fields_of_list: set[str] = set()
-        for entry in entries:
-            fields_of_list.update(_fields(field, entry))
-        names.append(fields_of_list)
-    for some, others in combinations(names, 2):
-        if some & others:
+        names = set[str]().union(*(_fields(field, entry) for entry in entries))
+        if names & said:
             raise InputError(
-                f"product must say {min(some & others)} in one list, got it in two"
+                f"product must say {min(names & said)} in one list, got it in two"
             )
+        said |= names
     if "methods" in crossed:
         # A product varies its last list fastest. With the methods last, an unfinished
         # sweep has all methods on the cases that are done.

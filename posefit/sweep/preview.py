@@ -5,7 +5,7 @@ method's factory refuses, which checking a plan cannot find.
 """
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from itertools import islice
@@ -52,25 +52,25 @@ def preview(plan: str, out: str | None, shard: str | None, limits: Limits) -> Pr
         ValueError: The plan is wrong, or a method fails in its first frames.
     """
     counts: dict[str, Counter[str]] = {}
-    times: dict[str, _Times] = {}
+    to_run: dict[str, list[Cell]] = {}  # by method and settings
     listed = []
-    evaluations = 0
     for cell, done in _cells(plan, out, shard):
         listed.append({"key": cell.key, "done": done, **cell.spec})
         for name, value in cell.spec.items():
             text = value if isinstance(value, str) else json_of(value)
             counts.setdefault(name, Counter())[text] += 1
         if not done:
-            evaluations += cell.total_evaluations
             method = json_of([cell.method, dict(cell.settings)])
-            times.setdefault(method, _Times(cell)).add(cell)
-    to_run = sum(each.count for each in times.values())
+            to_run.setdefault(method, []).append(cell)
+    cells = [cell for group in to_run.values() for cell in group]
+    evaluations = sum(cell.total_evaluations for cell in cells)
     last = (
-        f"{len(listed):,} cells, {to_run:,} of them to run, {evaluations:,} evaluations"
+        f"{len(listed):,} cells, {len(cells):,} of them to run, "
+        f"{evaluations:,} evaluations"
     )
     lines = [*_value_lines(counts), last]
     with closing(Pool(1, limits, run_cell)) as pool:
-        seconds = sum(each.seconds(pool) for each in times.values())
+        seconds = sum(_seconds_of(group, pool) for group in to_run.values())
     return Preview(lines, listed, seconds)
 
 
@@ -118,34 +118,24 @@ def _value_lines(counts: Mapping[str, Counter[str]]) -> list[str]:
     return lines
 
 
-class _Times:
-    """Estimates the time of one method's cells from two short runs of its first one."""
+def _seconds_of(cells: Sequence[Cell], pool: Pool) -> float:
+    """Return about how many seconds one method's cells take.
 
-    def __init__(self, first: Cell) -> None:
-        self._first = first
-        self._amount = 0.0
-        self.count = 0
-
-    def add(self, cell: Cell) -> None:
-        self.count += 1
-        self._amount += _amount(cell)
-
-    def seconds(self, pool: Pool) -> float:
-        """Return about how many seconds the cells take.
-
-        Raises InputError if a run fails.
-        """
-        if not isinstance(self._first, TrackCell):
-            return _seconds(self._first, pool) / _amount(self._first) * self._amount
-        short = replace(self._first, frames=SHORT)
-        longer = replace(self._first, frames=LONGER)
-        _seconds(longer, pool)  # imports and compiles
-        of_short = _seconds(short, pool)
-        more = _amount(longer) - _amount(short)
-        slope = (_seconds(longer, pool) - of_short) / more
-        slope = max(slope, 0.0)
-        fixed = max(of_short - slope * _amount(short), 0.0)
-        return fixed * self.count + slope * self._amount
+    The estimate is from two short runs of the first one. Raises InputError if a run
+    fails.
+    """
+    first = cells[0]
+    amount = sum(map(_amount, cells))
+    if not isinstance(first, TrackCell):
+        return _seconds(first, pool) / _amount(first) * amount
+    short = replace(first, frames=SHORT)
+    longer = replace(first, frames=LONGER)
+    _seconds(longer, pool)  # imports and compiles
+    of_short = _seconds(short, pool)
+    more = _amount(longer) - _amount(short)
+    slope = max((_seconds(longer, pool) - of_short) / more, 0.0)
+    fixed = max(of_short - slope * _amount(short), 0.0)
+    return fixed * len(cells) + slope * amount
 
 
 def _amount(cell: Cell) -> float:

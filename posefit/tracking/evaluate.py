@@ -70,13 +70,39 @@ def evaluate(
             scene, tracked.frames, frames, table, measures.iou, task.training
         )
     motion = scene.motion(frames)
-    modes = track_modes(skeleton, posteriors)
     backwards = walks_backwards(motion, unseen(table))
     warnings = [*scene.warnings, *method.audit.warnings]
     if scene.truth is None and (warning := backwards_warning(backwards)):
         warnings.append(warning)
+    modes = track_modes(skeleton, posteriors)
+    outside = tracked.stay
+    if outside:
+        outside = (scene.first + outside[0], scene.first + outside[1])
+    log = TrackingLog(
+        hypotheses=tracked.hypotheses,
+        build=None if shape is None else shape.as_dict(),
+        trace=frames[0].trace.tolist() if len(frames) == 1 else None,
+        modes=[round(mode.weight, 6) for mode in modes] or None,
+        none_of_modes=_none_right(posteriors),
+        unknown_sides=_numbers(table, "unknown_sides"),
+        lost_frames=_numbers(table, "lost"),
+        relocalised=_relocalised(scene, frames),
+        retracked_outside=outside,
+        backwards_share=round(float(backwards.mean()), 6),
+        warnings=warnings,
+        guesses=[*scene.guesses],
+    )
+    gait = Gait(why="one frame is no walk")
+    if len(frames) > 1:
+        gait = gait_of(motion, unseen(table))
+    setup = _setup(scene, method, task, options)
+    return Track(motion, frames, table, measures, trust, gait, setup, log, modes, scene)
+
+
+def _setup(scene: Scene, method: Method, task: Task, options: TrackOptions) -> Setup:
+    """Return the arguments and the circumstances of a track."""
     assert options.evaluations is not None
-    setup = Setup(
+    return Setup(
         motion=scene.name,
         method=method.name,
         settings=method.settings,
@@ -93,35 +119,24 @@ def evaluate(
         fps=scene.fps,
         frames=scene.count,
     )
-    none_right = []  # the probabilities that none of a frame's modes is right
+
+
+def _none_right(posteriors: Sequence[Posterior | None]) -> float | None:
+    """Return the mean probability that none of a frame's modes is right, if known."""
+    none = list[float]()
     for posterior in posteriors:
         if posterior is not None and posterior.recalibration is not None:
-            none_right.append(posterior.recalibration.none)
-    relocalised = []
+            none.append(posterior.recalibration.none)
+    return round(float(np.mean(none)), 6) if none else None
+
+
+def _relocalised(scene: Scene, frames: Sequence[Frame]) -> list[int]:
+    """Return the numbers of the frames in which the person was searched again."""
+    numbers = list[int]()
     for number, frame in enumerate(frames, scene.first):
         if RELOCALISED in frame.details:
-            relocalised.append(number)
-    outside = tracked.stay
-    if outside:
-        outside = (scene.first + outside[0], scene.first + outside[1])
-    log = TrackingLog(
-        hypotheses=tracked.hypotheses,
-        build=None if shape is None else shape.as_dict(),
-        trace=frames[0].trace.tolist() if len(frames) == 1 else None,
-        modes=[round(mode.weight, 6) for mode in modes] or None,
-        none_of_modes=round(float(np.mean(none_right)), 6) if none_right else None,
-        unknown_sides=_numbers(table, "unknown_sides"),
-        lost_frames=_numbers(table, "lost"),
-        relocalised=relocalised,
-        retracked_outside=outside,
-        backwards_share=round(float(backwards.mean()), 6),
-        warnings=warnings,
-        guesses=[*scene.guesses],
-    )
-    gait = Gait(why="one frame is no walk")
-    if len(frames) > 1:
-        gait = gait_of(motion, unseen(table))
-    return Track(motion, frames, table, measures, trust, gait, setup, log, modes, scene)
+            numbers.append(number)
+    return numbers
 
 
 def _finished(scene: Scene, posterior: Posterior, height_known: bool) -> Posterior:

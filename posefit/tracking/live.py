@@ -18,12 +18,13 @@ from posefit.files import check_free
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.cameras import combined
 from posefit.footage.live import Stream, live_views
+from posefit.footage.observations import Observations
 from posefit.footage.pairing import calibrated
 from posefit.footage.scene import Scene
 from posefit.footage.source import body_of, logged
 from posefit.footage.straightening import straightening
 from posefit.footage.uses import check_used
-from posefit.footage.views import Observations, View, joined
+from posefit.footage.views import View, joined
 from posefit.motion.clips import training_clips, training_motions
 from posefit.options import declared
 from posefit.progress import QUIET, Progress

@@ -134,7 +134,6 @@ def track_scene(
         method = prepare(options, task)
         passes = _passes(scene, method, task.evaluations, bool(options.smooth))
         task = replace(task, evaluations=task.evaluations // passes)
-        alone = scene.count == 1 and scene.truth is None
         polishing = _polish_evaluations(scene, method, task.evaluations, options)
         task = replace(task, evaluations=task.evaluations - polishing)
         with progress.phase("build"):
@@ -150,48 +149,18 @@ def track_scene(
             )
             tracked = cheapest(scene, hypotheses, task.training)
             effort["frames"] = _evaluations(tracked.frames)
-            if scene.truth is None and method.looks_ahead:
-                tracked = retrack_spins(
-                    task, scene.observations, tracked, method.follow, options.seed
-                )
-                if tracked.stay is not None:
-                    outside = "tracked again before frame {} and after frame {}".format(
-                        *tracked.stay
-                    )
-                    progress.log(f"the body turned faster than a person can: {outside}")
+            tracked = _without_spins(scene, task, method, tracked, options, progress)
         frames = tracked.frames
-        if polishing:
-            shown = next(iter(scene.observations))
-            assert method.prior is not None
-            search = replace(task, start=method.start if task.yaw is None else None)
-            known = shown, polishing, method.audit.beta
-            frames = [polished(search, frames[0], *known)]
+        if scene.count == 1 and scene.truth is None:
+            scene, frames = _of_one_picture(
+                scene, task, method, frames, polishing, progress
+            )
             effort["frames"] = _evaluations(frames)
-            left = beyond_prior(method.prior, task.body.skeleton, frames[0].pose)
-            if left:
-                progress.warn(left)
-                scene = replace(scene, warnings=[*scene.warnings, left])
-        elif alone and method.prior is not None and frames[0].posterior is None:
-            frames = [with_one_mode(frames[0])]
         smoothed = Smoothed(scene, frames, shape)
         smoothing = PoseCount()
         if options.smooth and scene.count > 1:
             with progress.phase("smooth"), smoothing.counting():
-                smoothed = smooth(*smoothed, method.audit.beta)
-                usable = sum(observation.usable for observation in scene.observations)
-                if (
-                    len(scene.cameras) == 1
-                    and usable >= SHORTEST
-                    and scene.truth is None
-                ):
-                    smoothed, exchanged = with_cheapest_legs(
-                        frames, smoothed, method.audit.beta
-                    )
-                    if exchanged.any():
-                        progress.log(
-                            f"legs exchanged in {exchanged.sum()} frames,"
-                            " where smooth ones then fit better"
-                        )
+                smoothed = _smoothed(smoothed, method.audit.beta, progress)
         if passes > 1:
             again = passes, options.seed, progress
             tracked, smoothed = _cheapest_pass(
@@ -222,6 +191,88 @@ def track_scene(
     for warning in track.log.warnings[len(scene.warnings) :]:
         progress.warn(warning)
     return track
+
+
+def _without_spins(
+    scene: Scene,
+    task: Task,
+    method: Method,
+    tracked: Tracked,
+    options: TrackOptions,
+    progress: Progress,
+) -> Tracked:
+    """Return a track of footage in which the body turns no faster than a person can.
+
+    A known motion, and a tracker that does not look ahead, are left as they are.
+    """
+    if scene.truth is not None or not method.looks_ahead:
+        return tracked
+    tracked = retrack_spins(
+        task, scene.observations, tracked, method.follow, options.seed
+    )
+    if tracked.stay is not None:
+        first, last = tracked.stay
+        progress.log(
+            "the body turned faster than a person can: tracked again before frame "
+            f"{first} and after frame {last}"
+        )
+    return tracked
+
+
+def _of_one_picture(
+    scene: Scene,
+    task: Task,
+    method: Method,
+    frames: list[Frame],
+    polishing: int,
+    progress: Progress,
+) -> tuple[Scene, list[Frame]]:
+    """Return the scene and the frame of a single picture, with all poses it may show.
+
+    Args:
+        scene: The scene.
+        task: The task.
+        method: The method that tracked it.
+        frames: Its only frame.
+        polishing: Evaluations for another search around the poses found; 0 for none.
+        progress: Gets a warning if the prior cannot represent the pose.
+
+    """
+    prior = method.prior
+    if prior is None:
+        return scene, frames
+    (frame,) = frames
+    if not polishing:
+        # a method without a posterior reports one pose
+        one_mode = frame if frame.posterior else with_one_mode(frame)
+        return scene, [one_mode]
+    shown = next(iter(scene.observations))
+    search = replace(task, start=method.start if task.yaw is None else None)
+    frame = polished(search, frame, shown, polishing, method.audit.beta)
+    if warning := beyond_prior(prior, task.body.skeleton, frame.pose):
+        progress.warn(warning)
+        scene = replace(scene, warnings=[*scene.warnings, warning])
+    return scene, [frame]
+
+
+def _smoothed(tracked: Smoothed, beta: float, progress: Progress) -> Smoothed:
+    """Return a smoothed track, with legs exchanged where smooth ones then fit better.
+
+    Legs are only doubtful before one camera, and in footage long enough to judge them.
+    `beta` is the weight in the cost.
+    """
+    smoothed = smooth(*tracked, beta)
+    scene = smoothed.scene
+    usable = sum(observation.usable for observation in scene.observations)
+    if len(scene.cameras) > 1 or scene.truth is not None or usable < SHORTEST:
+        return smoothed
+    smoothed, exchanged = with_cheapest_legs(tracked.frames, smoothed, beta)
+    if exchanged.any():
+        progress.log(
+            f"legs exchanged in {exchanged.sum()} frames,"
+            " where smooth ones then fit better"
+        )
+    return smoothed
 
 
 def track_hypotheses(

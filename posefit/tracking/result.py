@@ -27,8 +27,8 @@ from posefit.measuring.gait import Gait
 from posefit.measuring.tables import angle_columns, import_pandas
 from posefit.motion.motion import Motion
 from posefit.output.content import Content, Setup, TrackingLog
-from posefit.output.files import page_of
 from posefit.output.folder import OutputFolder
+from posefit.output.pictures import page_of
 from posefit.output.text import table
 from posefit.progress import interactive
 from posefit.reading import quoted, suggestion

@@ -1,11 +1,15 @@
 """A number means the same in an environment as in a sweep, and many scenes together what the library has of each."""
 
+import importlib
+import pkgutil
 from typing import Any
 
 import numpy as np
 import pytest
 
+import posefit_envs
 from posefit import Camera, Problem, project
+from posefit.motion.instances import TRAINING
 from posefit.silhouette.corruption import CORRUPTIONS
 from posefit.sweep.cell import cell_scene
 from posefit.sweep.plan import Plan
@@ -33,6 +37,16 @@ def both(motion: str, number: int, frames: int, **arguments):
     arguments |= {"view_degrees": (45.0, 90.0), "held_out_people": False}
     world = world_of(motion=motion, **arguments)
     return cell_scene(cell), instance(world, number, frames, 10)
+
+
+def test_what_is_kept_of_instances_is_limited():
+    """Memory grows until each training instance was met, and not further."""
+    for module in pkgutil.iter_modules(posefit_envs.__path__, "posefit_envs."):
+        for value in vars(importlib.import_module(module.name)).values():
+            if hasattr(value, "cache_parameters"):
+                assert 0 < value.cache_parameters()["maxsize"] <= len(TRAINING), value
+    scene = first_scene(world_of(), 17)
+    assert sum(column.nbytes for column in scene) < 5000
 
 
 @each("number", [0, 17, 10_017])

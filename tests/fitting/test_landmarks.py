@@ -22,7 +22,7 @@ from posefit.fitting.landmarks import (
     side_odds,
     usually_exchanged,
 )
-from posefit.footage.views import Observations
+from posefit.footage.observations import Observations
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import JOINTS, MIRROR
 from posefit.motion import built_in

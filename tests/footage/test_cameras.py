@@ -135,6 +135,31 @@ def test_a_scene_that_was_reconstructed_has_the_scale_of_the_person(
     assert said.startswith("the calibration's unit is ")
 
 
+@each("unit", ["m", "cm", "mm", "inch"])
+@each("order", [(0, 1), (1, 0)])
+def test_a_camera_whose_unit_is_known_keeps_it_beside_one_whose_unit_is_open(
+    tmp_path: Path, unit: Any, order: tuple[int, int]
+) -> None:
+    stated = Calibration.of(camera(AZIMUTHS[0]), "a")
+    open_one = Calibration.of(camera(AZIMUTHS[1]), "b")
+    known = [
+        stated,
+        replace(
+            open_one, scale="open", translation=open_one.translation / METRES[unit]
+        ),
+    ]
+    sources = views(tmp_path)
+    scene = scene_of(
+        [sources[k] for k in order],
+        SourceOptions(camera=[known[k] for k in order], up="y", height=1.74),
+    )
+    for k, one in zip(order, scene.cameras, strict=True):
+        np.testing.assert_allclose(
+            one.position, camera(AZIMUTHS[k]).position, atol=1e-6
+        )
+    assert list(scene.guesses) == [f"the calibration is in {UNIT_NAMES[unit]}"]
+
+
 @pytest.mark.parametrize("program", OF_ONE_UNIT)
 def test_a_file_whose_program_writes_one_unit_needs_none(
     tmp_path: Path, program: str

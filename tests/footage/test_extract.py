@@ -295,10 +295,7 @@ def test_masks_that_contradict_themselves_are_named(
 
 def frame_numbers(video: Video, *chosen: Any) -> list[int]:
     """Return the numbers of the frames, which are as grey as their number says."""
-    return [
-        round(float(image.mean()) / 20.0)
-        for image in video.frames(*(chosen or (0, None)), video.size)
-    ]
+    return [round(float(image.mean()) / 20.0) for image in video.frames(*chosen)]
 
 
 def grey(path: Path, milliseconds: list[int]) -> Video:
@@ -411,7 +408,7 @@ def test_an_unstated_rate_is_guessed_aloud(
 
 
 def test_a_walker_goes_as_fast_as_the_stamps_say(filmed: Film, tmp_path: Path) -> None:
-    pictures = list(Video.of(filmed[0]).frames(0, None, SIZE))
+    pictures = list(Video.of(filmed[0]).frames())
     taken = [k for k in range(len(pictures)) if k % 10 not in (3, 4, 7)]
     path = write_matroska(
         tmp_path / "a.mkv", [pictures[k] for k in taken], [40 * k for k in taken]
@@ -465,7 +462,7 @@ def test_pictures_are_extracted_masks_cleaned_and_motions_drawn(
     filmed: Film, tmp_path: Path
 ) -> None:
     (tmp_path / "film").mkdir()
-    for k, image in enumerate(Video.of(filmed[0]).frames(0, 30, SIZE)):
+    for k, image in enumerate(Video.of(filmed[0]).frames(0, 30)):
         cv2.imwrite(str(tmp_path / "film" / f"{k + 1:03d}.png"), image)
     words = ["--background", "0:10", "--frames", "10:25"]
     result = run("extract", tmp_path / "film", *words, "--out", tmp_path / "out")

@@ -16,10 +16,12 @@ from posefit.fitting import metrics
 from posefit.footage.camera_motion import CameraMotion
 from posefit.footage.extract import extract
 from posefit.footage.extraction import Extraction
+from posefit.footage.kept import KeptFrames
+from posefit.footage.observations import Observations
 from posefit.footage.options import SourceOptions
 from posefit.footage.source import scene_of
+from posefit.footage.straightening import undistorted
 from posefit.footage.video import Video
-from posefit.footage.views import Observations, undistorted
 from posefit.geometry.calibration import Calibration
 from posefit.geometry.rotation import wrapped
 from posefit.progress import Progress
@@ -268,8 +270,7 @@ def test_two_people_and_a_moving_camera_are_warned_of(tmp_path: Path) -> None:
     )
     still = film(tmp_path / "still.avi", masks)
     panned = [
-        np.roll(image, k, axis=1)
-        for k, image in enumerate(Video.of(still).frames(0, None, SIZE))
+        np.roll(image, k, axis=1) for k, image in enumerate(Video.of(still).frames())
     ]
     moving = extract(encoded(tmp_path / "moving.avi", panned), tmp_path / "two")
     assert any("the camera seems to move" in warning for warning in moving["warnings"])
@@ -310,7 +311,7 @@ def test_a_camera_that_stands_still_does_not_seem_to_move(
     filmed: Film, change: Callable[[Any, int], Any]
 ) -> None:
     camera_motion = CameraMotion(SIZE)
-    for k, image in enumerate(Video.of(filmed[0]).frames(0, None, SIZE)):
+    for k, image in enumerate(Video.of(filmed[0]).frames()):
         camera_motion.add(
             k, np.clip(change(image.astype(np.float32), k), 0, 255).astype(np.uint8)
         )
@@ -318,10 +319,11 @@ def test_a_camera_that_stands_still_does_not_seem_to_move(
 
 
 def test_a_video_that_changes_its_size_is_named(filmed: Film) -> None:
+    none = KeptFrames((80, 60), ())
     with pytest.raises(
         ValueError, match="walk.avi: expected frames of 160x60, got 160x120 in frame 0"
     ):
-        list(replace(Video.of(filmed[0]), size=(160, 60)).frames(0, None, (160, 60)))
+        list(replace(Video.of(filmed[0], 80), filmed=(160, 60), _kept=none).frames())
 
 
 @each(

@@ -15,11 +15,12 @@ import pytest
 from posefit.files import opencv_name
 from posefit.footage.kinds import resolve
 from posefit.footage.options import SourceOptions
+from posefit.footage.rates import rate_of
 from posefit.footage.source import scene_of
-from posefit.footage.video import Video, _rate
+from posefit.footage.video import Video
 from tests.cases import each
 from tests.commands import error_of
-from tests.footage.conftest import EMPTY, SIZE, Film, film, iou, stack, truth
+from tests.footage.conftest import EMPTY, Film, film, iou, stack, truth
 from tests.footage.matroska import write_matroska
 
 
@@ -136,9 +137,7 @@ Video.of(b'{tmp_path}/caf\\xc3\\xa9.avi'.decode('ascii', 'surrogateescape'))
 def written(folder: Path, path: Path, suffix: str, numbers: list[int]) -> Path:
     """Write the frames of a film as pictures with these numbers, and return their folder."""
     folder.mkdir()
-    for number, image in zip(
-        numbers, Video.of(path).frames(0, None, SIZE), strict=False
-    ):
+    for number, image in zip(numbers, Video.of(path).frames(), strict=False):
         assert cv2.imwrite(str(folder / f"frame{number}{suffix}"), image)
     return folder
 
@@ -193,4 +192,4 @@ def test_the_stated_rate_is_kept_where_the_times_allow_it(
 ) -> None:
     for seconds in (20, 200):
         times = np.arange(round(seconds * rate) + 1) / rate
-        assert _rate(times, 0.0, stated) == pytest.approx(expected, rel=1e-9)
+        assert rate_of(times, 0.0, stated) == pytest.approx(expected, rel=1e-9)

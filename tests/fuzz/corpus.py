@@ -10,7 +10,7 @@ import numpy as np
 from PIL import Image
 
 from posefit import Camera
-from posefit.footage.video import VideoWriter
+from posefit.footage.writing import VideoWriter
 from posefit.geometry.body import Body
 from posefit.motion import built_in
 from posefit.motion.amc import write_amc

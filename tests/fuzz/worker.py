@@ -31,9 +31,9 @@ LONGEST = 400  # characters of a message
 def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
     """Return what reads each kind of file, as far as a user's file goes before anything is searched."""
     from posefit.footage.kinds import resolve
+    from posefit.footage.observations import Observations
     from posefit.footage.source import views_of_masks
     from posefit.footage.video import Video
-    from posefit.footage.views import Observations
     from posefit.geometry.calibration import read_calibrations, upright
     from posefit.motion.amc import read_amc
     from posefit.motion.asf import parse_asf
@@ -71,10 +71,8 @@ def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
         ]
 
     def video(path: Path) -> object:
-        filmed = Video.of(path)
-        return filmed.warnings, [
-            image.mean() for image in islice(filmed.frames(0, None, (64, 48)), 20)
-        ]
+        filmed = Video.of(path, 64)
+        return filmed.warnings, [image.mean() for image in islice(filmed.frames(), 20)]
 
     return {
         "asf": parse_asf,

@@ -24,18 +24,18 @@ from posefit.errors import InputError
 from posefit.evaluation.errors import evaluated, unseen
 from posefit.evaluation.measures import Effort
 from posefit.fitting.tracker import Frame, Observation
-from posefit.footage import video
+from posefit.footage import writing
 from posefit.footage.extract import extract
 from posefit.footage.extraction import Extraction
 from posefit.footage.scene import Scene
-from posefit.footage.video import VideoWriter, video_rate
+from posefit.footage.writing import VideoWriter, video_rate
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.limits import RATES
 from posefit.measuring.centres import PLACES
 from posefit.measuring.gait import gait_of
 from posefit.motion import built_in
-from posefit.output import files
+from posefit.output import files, pictures
 from posefit.output.content import Setup, TrackingLog
 from posefit.output.files import FILES, WRITERS, chosen_kinds
 from posefit.output.folder import OutputFolder
@@ -372,7 +372,7 @@ def test_a_video_has_the_nearest_rate_that_mpeg_4_counts(tmp_path: Path) -> None
         capture = cv2.VideoCapture(str(tmp_path / "a.mp4"))
         rate = capture.get(cv2.CAP_PROP_FPS)
         capture.release()
-        low, high = video.WRITTEN_RATES
+        low, high = writing.WRITTEN_RATES
         bounded = min(max(fps, low), high)
         # a decimal fraction of at most three places, which OpenCV takes to a thousandth
         finest = max(n for n in (1, 10, 100, 1000) if n * bounded <= MAX_TICKS)
@@ -453,8 +453,8 @@ def test_what_fails_of_a_video_is_said_before_the_work_and_costs_nothing_else(
         (Painter, "add", {"overlay.mp4", "summary.png"}),
         (Painter, "summary", {"summary.png"}),
         (VideoWriter, "write", {"overlay.mp4"}),
-        (files.Stills, "add", {"track.html"}),
-        (files, "track_data", {"track.html"}),
+        (pictures.Stills, "add", {"track.html"}),
+        (pictures, "track_data", {"track.html"}),
     ],
 )
 def test_a_picture_that_fails_costs_only_itself(
@@ -553,7 +553,7 @@ def test_a_chosen_file_costs_no_look_at_the_footage(tmp_path: Path) -> None:
 
 @each(
     ("owner", "name"),
-    [(VideoWriter, "close"), (VideoWriter, "write"), (files, "_write_png")],
+    [(VideoWriter, "close"), (VideoWriter, "write"), (pictures, "_write_png")],
 )
 def test_a_disk_without_room_for_a_picture_costs_no_poses(
     owner: Any, name: str, tmp_path: Path

@@ -46,20 +46,31 @@ def test_the_leader_its_lead_and_how_certain_it_is(tmp_path: Path) -> None:
     ]
 
 
-def test_without_a_difference_no_method_leads_and_the_seeds_needed_are_named(
+def test_the_seeds_that_would_show_a_difference_are_named(tmp_path: Path) -> None:
+    # b is behind by 3, -1, 2, -4, 3 and 3: mean 1 and standard deviation sqrt(42 / 5)
+    behind = [3.0, -1.0, 2.0, -4.0, 3.0, 3.0]
+    errors = {("a", i, 0): 10.0 for i in range(6)}
+    errors |= {("b", i, 0): 10.0 + by for i, by in enumerate(behind)}
+    needed = (1.959964 + 0.841621) ** 2 * 42.0 / 5.0
+    assert sentences(contest_of_errors(tmp_path, errors))[2] == (
+        f"If the difference from b is real, about {math.ceil(needed / 6.0)} seeds of each instance would show it, "
+        "with a probability of 80 %."
+    )
+
+
+def test_without_a_difference_no_method_leads_and_too_few_runs_are_named(
     tmp_path: Path,
 ) -> None:
-    # b is behind by 3, 1, 2 and 4, and 5: mean 3 and standard deviation sqrt(2.5)
     errors = {("a", i, 0): 1.0 for i in range(5)}
     behind = [3.0, 1.0, 2.0, 4.0, 5.0]
     errors |= {("b", i, 0): 1.0 + by for i, by in enumerate(behind)}
     text = sentences(contest_of_errors(tmp_path, errors))
-    # five blocks give no p below 2 / 2^5, and six are needed for 2 / 2^6 < 0.05, which are two seeds of five instances
+    # five blocks give no p below 2 / 2^5, and six are needed for 2 / 2^6 < 0.05
     assert text[:3] == [
         "No method leads; a, which comes first, lost frames in none of 5 tracks and has an error with losses of "
         "1.00° on 5 instances of walk with one seed.",
         "No difference is shown from b (+3.00°, p = 0.062).",
-        "If the difference from b is real, about 2 seeds of each instance would show it, with a probability of 80 %.",
+        "5 paired runs cannot show a difference between 2 methods: that takes at least 6.",
     ]
 
 
@@ -87,7 +98,8 @@ def test_one_method_alone_one_run_alone_and_a_leader_behind_the_baselines(
     two = {"a": 1.0, "b": 2.0}
     many = {"a": 1.0, "b": 2.0, "c": 3.0, "d": 4.0, "e": 5.0}
     cases = [
-        (full(many, instances=8), "it leads all 4 others, the nearest of them, b, by "),
+        (full(many, instances=8), "p < 0.001), and c, d and e by more (p < 0.001)."),
+        (full({"a": 1.0, "b": 1.0}, 4), "is shown from b (equal in all runs)."),
         (full({"a": 1.0}), "a lost frames in none of 4 tracks and has an error with "),
         (full({"a": 1.0}), "No other method shares its runs."),
         (full(two, instances=1, seeds=1), "One shared run shows no difference between"),

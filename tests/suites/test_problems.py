@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable
 from copy import copy, deepcopy
 from itertools import product
+from pathlib import Path
 from pickle import PicklingError
 from typing import Any
 
@@ -19,7 +20,7 @@ from posefit.suites.boxes import HELD_OUT_PEOPLE, TRAINING_PEOPLE, learned_witho
 from posefit.suites.functions import FUNCTIONS, SUITE
 from posefit.suites.instances import suite_instance
 from posefit.suites.running import run_on
-from posefit_bridges.problems import ioh_problem
+from posefit_bridges.problems import close_log, ioh_problem
 from tests.cases import each
 from tests.suites.numbers import FILE, addresses, areas_of, fixed_proposals, mask_of
 
@@ -421,6 +422,21 @@ def test_iohexperimenter_has_the_trace_of_a_plain_loop_in_each_run() -> None:
                 == len(posed.trace[0])
                 == 0
             )
+
+
+def test_a_log_of_iohexperimenter_names_the_suite(tmp_path: Path) -> None:
+    ioh = pytest.importorskip("ioh", reason="it is in the extra test")
+    logger = ioh.logger.Analyzer(root=str(tmp_path), folder_name="log")
+    for number in (1, 7):
+        dimension = 9 if number == 1 else 66
+        wrapped = ioh_problem(problem(number, dimension=dimension))
+        wrapped.attach_logger(logger)
+        wrapped(np.zeros(dimension))
+        wrapped.detach_logger()
+    close_log(logger)
+    logs = [json.loads(path.read_text()) for path in tmp_path.glob("log/*.json")]
+    assert sorted(log["function_id"] for log in logs) == [26_301, 26_307]
+    assert {log["suite"] for log in logs} == {SUITE}
 
 
 def test_iohexperimenter_finds_the_optimum_and_keeps_a_budget() -> None:

@@ -352,7 +352,7 @@ def test_shards_another_order_and_dask_give_the_rows_of_one_run_bit_for_bit(
             tmp_path / "dask", list(plan)[::-1], cluster(address, Limits(), run_cell)
         ).done == len(plan)
     first = content(tmp_path / "one")
-    assert len(first[0]) == len(plan)
+    assert len(first) == len(plan)
     assert content(tmp_path / "shards") == content(tmp_path / "dask") == first
 
 

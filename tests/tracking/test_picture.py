@@ -140,6 +140,23 @@ def test_a_lost_frame_has_a_border(
     assert pixels(image[-40:, -PANEL + 12 : -PANEL + 120], MISSED) == 0 or marked
 
 
+def test_a_pose_that_is_held_is_neither_lost_nor_of_unknown_sides(
+    scene: Scene, frame: Frame, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words = list[str]()
+    monkeypatch.setattr(
+        picture, "write", lambda image, text, *_, **__: words.append(text)
+    )
+    held = replace(scene.observations[0], usable=False)
+    for observation in (scene.observations[0], held):
+        words.clear()
+        Painter(scene).add(frame, observation, row(lost=1.0, unknown_sides=1.0))
+        searched = observation.usable
+        assert ("lost" in words) == searched
+        assert ("left and right unknown" in words) == searched
+        assert any("pose held" in text for text in words) != searched
+
+
 @each("azimuth", [0.0, 0.7, -2.0, 3.1])
 def test_the_side_view_has_the_whole_body_from_the_right(
     scene: Scene, frame: Frame, azimuth: float

@@ -1,0 +1,182 @@
+"""FitImage-v1 for learners: small pictures, and actions that correct a proposal."""
+
+import math
+from typing import Any
+
+import numpy as np
+from gymnasium import error
+from gymnasium.spaces import Box
+from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from posefit.arrays import Array
+from posefit_envs.base import Flags, Infos
+
+Features = NDArray[np.float32]
+
+# pixels of a picture that a pixel of the small one has, in each direction
+BLOCK = 4
+# reach of a correction, in half-ranges of the box; the first proposal reaches all of it
+REACH = 0.3
+# after as many corrections in vain an agent sees no difference any more
+MOST_FAILURES = 4
+
+
+class Corrections(VectorWrapper[Any, Any, Any, Any, Any]):
+    """A vector of FitImage-v1 in which actions correct the best proposal so far.
+
+    Proposals of poses are hard to get right from a picture alone. A correction of a
+    proposal that is near the truth is easier, if its silhouette is seen beside the
+    observed one. This wrapper remembers the best proposal of each episode, shows where
+    its silhouette differs, and adds the action to it.
+
+    Actions are corrections in [-1, 1]^d. The first is the first proposal itself. Later
+    ones are 0.3 half-ranges of the box at most, and half as far after each correction
+    that made the cost no better. Proposals are clipped to the box; an unknown yaw goes
+    round instead.
+
+    Observations have 2 p + d + 2 numbers of -1 to 1:
+
+    | numbers | of what |
+    |---|---|
+    | p | the observed silhouette, as means of 4 x 4 pixels, 0 to 1 |
+    | p | the same, less the silhouette of the best proposal |
+    | d | the best proposal; zeros before the first |
+    | 1 | 1 before the first proposal, else 0 |
+    | 1 | corrections in vain since the best proposal, 0 to 4, / 4 |
+
+    Infos and rewards are the environment's, and so are its problems: `best` of each is
+    the best proposal.
+
+    Args:
+        env: A vector of FitImage-v1, native or not, without other wrappers of
+            observations. Its autoreset mode must not be SAME_STEP.
+
+    Raises:
+        gymnasium.error.Error: If the environment is of another kind or mode, or its
+            pictures cannot be divided into blocks of 4 x 4 pixels.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> from posefit_envs import Corrections
+        >>> env = Corrections(gym.make_vec("posefit_envs:posefit/FitImage-v1", 2))
+        >>> observations, infos = env.reset(seed=0)
+        >>> observations.shape, env.single_action_space.shape
+        ((2, 395), (9,))
+    """
+
+    def __init__(self, env: VectorEnv[Any, Any, Any]) -> None:
+        super().__init__(env)
+        pictures = env.single_observation_space.shape or ()
+        proposals = env.single_action_space.shape or ()
+        if len(pictures) != 3 or len(proposals) != 1:
+            raise error.Error(
+                f"env must be posefit/FitImage-v1, got pictures of shape {pictures}"
+            )
+        if pictures[0] % BLOCK or pictures[1] % BLOCK:
+            raise error.Error(
+                f"sizes must be divisible by {BLOCK}, got pictures of shape {pictures}"
+            )
+        mode = AutoresetMode(env.metadata["autoreset_mode"])
+        if mode is AutoresetMode.SAME_STEP:
+            raise error.Error("autoreset_mode must be NextStep or Disabled")
+        count = env.num_envs
+        (dimensions,) = proposals
+        pixels = int(np.prod(pictures)) // (2 * BLOCK**2)
+        self.single_observation_space = Box(
+            -1.0, 1.0, (2 * pixels + dimensions + 2,), np.float32
+        )
+        self.observation_space = batch_space(self.single_observation_space, count)
+        worlds = env.unwrapped.get_attr("world")  # type: ignore[attr-defined]
+        self._goes_round = worlds[0].yaw == "unknown"
+        self._observed = np.zeros((count, pixels), dtype=np.float32)
+        self._best = np.zeros((count, dimensions))
+        self._best_drawn = np.zeros((count, pixels), dtype=np.float32)
+        self._best_costs = np.full(count, np.inf)
+        self._failures = np.zeros(count)
+
+    def reset(
+        self,
+        *,
+        seed: Any = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Features, Infos]:
+        """Begin episodes, with the options of the environment."""
+        pictures, infos = self.env.reset(seed=seed, options=options)
+        everyone = np.ones(self.num_envs, dtype=bool)
+        self._begin((options or {}).get("reset_mask", everyone), pictures)
+        return self._observations(), infos
+
+    def step(self, actions: Any) -> tuple[Features, Array, Flags, Flags, Infos]:
+        """Propose the best proposals, corrected."""
+        proposals = self.proposals(np.asarray(actions, dtype=np.float64))
+        pictures, rewards, terminated, truncated, infos = self.env.step(proposals)
+        begun = np.asarray(infos["evaluations"]) == 0
+        better = (infos["cost"] < self._best_costs) & ~begun
+        self._best[better] = proposals[better]
+        self._best_drawn[better] = shrunk(pictures[better, ..., 1::2])
+        self._best_costs[better] = infos["cost"][better]
+        self._failures = np.where(better, 0.0, self._failures + 1.0)
+        if begun.any():
+            self._begin(begun, pictures)
+        return self._observations(), rewards, terminated, truncated, infos
+
+    def proposals(self, actions: Array) -> Array:
+        """Return the proposals (n, d) that actions (n, d) make."""
+        first = np.isinf(self._best_costs)
+        reach = np.where(first, 1.0, REACH * 0.5**self._failures)
+        proposals = self._best + reach[:, None] * np.clip(actions, -1.0, 1.0)
+        if self._goes_round:
+            proposals[:, 0] = (proposals[:, 0] + 1.0) % 2.0 - 1.0
+        clipped: Array = np.clip(proposals, -1.0, 1.0)
+        return clipped
+
+    def _begin(self, rows: Flags, pictures: Any) -> None:
+        """Forget the proposals of some rows, and see their silhouettes."""
+        self._observed[rows] = shrunk(pictures[rows, ..., ::2])
+        self._best[rows] = 0.0
+        self._best_drawn[rows] = 0.0
+        self._best_costs[rows] = np.inf
+        self._failures[rows] = 0.0
+
+    def _observations(self) -> Features:
+        first = np.isinf(self._best_costs)
+        return features(
+            self._observed, self._best_drawn, self._best, first, self._failures
+        )
+
+
+def features(
+    observed: Features, drawn: Features, best: Array, first: Flags, failures: Array
+) -> Features:
+    """Return what an agent sees (n, 2 p + d + 2); see `Corrections`.
+
+    Args:
+        observed: The observed silhouettes (n, p), shrunk.
+        drawn: Those of the best proposals (n, p); zeros before the first proposal.
+        best: The best proposals (n, d).
+        first: Which rows (n,) have no proposal yet.
+        failures: Corrections (n,) in vain.
+    """
+    shown_failures = np.minimum(failures, MOST_FAILURES) / MOST_FAILURES
+    seen = [
+        observed, observed - drawn, best, first[:, None], shown_failures[:, None]
+    ]  # fmt: skip
+    return np.concatenate(seen, axis=1, dtype=np.float32)
+
+
+def shrunk(pictures: Any) -> Features:
+    """Return silhouettes (n, height, width, views) as small pictures (n, p).
+
+    A number of them is the mean of 4 x 4 pixels, 0 to 1.
+    """
+    count, height, width, views = pictures.shape
+    blocks = pictures.reshape(
+        count, height // BLOCK, BLOCK, width // BLOCK, BLOCK, views
+    )
+    # sums of rows first: two small sums are faster than one over two axes
+    sums = blocks.sum(axis=2, dtype=np.uint16).sum(axis=3, dtype=np.uint16)
+    whole = np.float32(255 * BLOCK**2)
+    small = sums.reshape(count, math.prod(sums.shape[1:]))
+    return np.asarray(small / whole, dtype=np.float32)
