@@ -237,7 +237,9 @@ def shown(hint: Any, default: Any = None) -> str:
     """
     hint = _plain(hint)
     if hint is NONE:
-        return "any" if default is None or default is NONE else type(default).__name__
+        if default is None or default is NONE:
+            return "any"
+        return type(default).__name__
     if hint in (Any, object):
         return "any"
     origin = get_origin(hint)
@@ -252,4 +254,6 @@ def shown(hint: Any, default: Any = None) -> str:
         for member in get_args(hint):
             inside.append("..." if member is Ellipsis else shown(member))
         return f"{origin.__name__}[{', '.join(inside)}]"
-    return hint.__name__ if isinstance(hint, type) else str(hint)
+    if isinstance(hint, type):
+        return hint.__name__
+    return str(hint)

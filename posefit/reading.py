@@ -44,12 +44,16 @@ def quoted(value: object) -> str:
 def cut(text: str, most: int = SHOWN) -> str:
     """Return a text on one line, cut if it is long."""
     text = printable(text[: most + 1])
-    return text if len(text) <= most else f"{text[: most - 3]}..."
+    if len(text) <= most:
+        return text
+    return f"{text[: most - 3]}..."
 
 
 def counted(count: int, word: str) -> str:
     """Return a count with its noun: `1 run`, `2,000 runs`."""
-    return f"{count:,} {word}" if count == 1 else f"{count:,} {word}s"
+    if count == 1:
+        return f"{count:,} {word}"
+    return f"{count:,} {word}s"
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:
@@ -60,7 +64,9 @@ def suggestion(name: str, known: Iterable[str]) -> str:
     names = list(known)
     others = [other for other in OTHER_WORDS.get(name, ()) if other in names]
     near = others or get_close_matches(name[:SHOWN], names, 1)
-    return f"; did you mean {near[0]!r}?" if near else ""
+    if near:
+        return f"; did you mean {near[0]!r}?"
+    return ""
 
 
 def existing(path: Path) -> Path:
@@ -86,7 +92,10 @@ def check_size(path: Path, most: int) -> None:
     """
     state = path.stat()
     if not stat.S_ISREG(state.st_mode):
-        came = "a folder" if stat.S_ISDIR(state.st_mode) else "a pipe or a device"
+        if stat.S_ISDIR(state.st_mode):
+            came = "a folder"
+        else:
+            came = "a pipe or a device"
         raise InputError(f"{path}: expected a file that can be read, got {came}")
     size = state.st_size
     if size > most:
@@ -136,7 +145,10 @@ def parsed_toml(text: str) -> dict[str, Any]:
     """
     weight = 0
     for number, line in enumerate(text.splitlines(), 1):
-        dots = _DECIMAL.sub("", line).count(".") if line.count(".") > 1 else 0
+        if line.count(".") > 1:
+            dots = _DECIMAL.sub("", line).count(".")
+        else:
+            dots = 0
         weight += dots * dots
         if dots > DOTS or weight > NESTING:
             raise InputError(

@@ -84,8 +84,8 @@ class Offer:
 
         That is its distribution and version, a digest of its package's source, and its
         library. posefit's own plugins have the same version; their packages' names
-        distinguish them. What they offer from posefit itself depends on posefit's
-        build.
+        distinguish them. Their parts that are imported from posefit depend on
+        posefit's build.
         """
         if self.distribution == OWN:
             return f"{self.name} {self.version}".rstrip()
@@ -480,7 +480,10 @@ def _offers(
         check_hints(label, factory)
 
     for kind in kinds:
-        register = command if kind == COMMAND else partial(method, kind)
+        if kind == COMMAND:
+            register = command
+        else:
+            register = partial(method, kind)
         getattr(manager.hook, f"posefit_register_{kind}s")(register=register)
     return offers
 

@@ -167,7 +167,9 @@ def population(
     default_size = known.get("population_size", 1)
     filled = planned(factory, chosen, evaluations)
     size = filled.get("population_size", default_size)
-    return size if isinstance(size, int) and size > 0 else 1
+    if isinstance(size, int) and size > 0:
+        return size
+    return 1
 
 
 def parse(
@@ -231,7 +233,9 @@ def setting_text(value: Any) -> str:
     if not isinstance(value, list | tuple):
         return str(value)
     numbers = all(type(member) in (int, float) for member in value)
-    return ",".join(map(str, value)) if value and numbers else json.dumps(value)
+    if value and numbers:
+        return ",".join(map(str, value))
+    return json.dumps(value)
 
 
 def _plain(value: Any) -> Any:
@@ -245,7 +249,10 @@ def _plain(value: Any) -> Any:
 
 def _known(plugin: str, name: str, known: Mapping[str, Setting]) -> Setting:
     if name not in known:
-        listed = f"one of {', '.join(known)}" if known else "none, it takes none"
+        if known:
+            listed = f"one of {', '.join(known)}"
+        else:
+            listed = "none, it takes none"
         near = suggestion(name, known)
         raise InputError(
             f"a setting of {plugin} must be {listed}, got {quoted(name)}{near}"

@@ -47,7 +47,9 @@ def source_digest(module: str, without: tuple[str, ...] = ()) -> str:
         with path.open("rb") as file:
             content = hashlib.file_digest(file, "sha256").digest()
         digest.update(f"{name}\0".encode(errors="surrogateescape") + content)
-    return digest.hexdigest()[:8] if found else ""
+    if found:
+        return digest.hexdigest()[:8]
+    return ""
 
 
 def _files_of(package: object) -> Iterator[tuple[str, Path]]:

@@ -167,7 +167,7 @@ def test_a_finished_folder_replaces_an_earlier_one_but_no_other_files(tmp_path):
     assert place.path.is_dir()
 
 
-def test_of_two_unfinished_folders_for_one_new_name_the_first_to_end_has_it(tmp_path):
+def test_the_first_of_two_tracks_to_finish_gets_the_folders_name(tmp_path):
     late, early = (Unfinished.begin(tmp_path / "out", {}) for _ in range(2))
     (late.path / "ours").write_text("late")
     (early.path / "ours").write_text("early")

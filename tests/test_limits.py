@@ -25,7 +25,7 @@ def swallows() -> None:
 
 
 @each("endless", [works, swallows])
-def test_what_takes_too_long_is_ended(endless: Callable[[], None]) -> None:
+def test_a_call_that_takes_too_long_is_ended(endless: Callable[[], None]) -> None:
     with pytest.raises(TimeoutError), timed(0.05):
         endless()
 

@@ -9,7 +9,7 @@ from posefit.reading import SHOWN, cut, parsed_json, parsed_toml, quoted, read_t
 from tests.cases import each
 
 
-def test_what_a_message_quotes_is_cut_at_80_characters():
+def test_a_quoted_value_is_cut_at_80_characters():
     assert quoted("walk") == "'walk'"
     assert len(quoted("n" * 10_000)) == SHOWN == 80
     assert quoted("n" * 10_000).endswith("...")
@@ -18,7 +18,7 @@ def test_what_a_message_quotes_is_cut_at_80_characters():
     assert quoted(16**5000) == "one int that is too long to write"
 
 
-def test_a_message_is_one_line_that_leaves_the_terminal_alone():
+def test_a_message_is_reported_in_one_line_that_leaves_the_terminal_alone():
     assert (
         str(InputError("a" * 200 + "b" * 200 + ": bad"))
         == "a" * 38 + "..." + "b" * 38 + ":" + " bad"

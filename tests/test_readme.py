@@ -22,7 +22,7 @@ def test_ci_runs_its_commands() -> None:
     assert second == "python -m pip install -e '.[test]' && python -m pytest\n"
 
 
-def test_what_it_links_to_is_there() -> None:
+def test_its_links_exist() -> None:
     links = re.findall(r"\]\(([^)#]+)[^)]*\)", TEXT)
     assert len(links) > 10
     assert [

@@ -121,10 +121,21 @@ def drive(
         evaluations: The budget.
         settings: Settings of the optimiser.
 
+    Returns:
+        The problem, with the best proposal and the count of evaluations.
+
     Raises:
         gymnasium.error.Error: For another environment, if a wrapper changes actions, if
             the budget is below one population, or if the instances differ (use
             `drive_each`).
+
+    Example:
+        >>> import gymnasium as gym
+        >>> from posefit_envs import drive
+        >>> name = "posefit_envs:posefit/FitImage-v1"
+        >>> many = gym.make_vec(name, num_envs=40, instance=17, max_evaluations=10**6)
+        >>> drive(many, "pso", evaluations=200).evaluations
+        200
     """
     steps = FitImageSteps(env)
     (space, *_), numbers = steps.begin(seed, instance)
@@ -164,8 +175,19 @@ def drive_each(
         evaluations: The budget of each search.
         settings: Settings of the optimiser.
 
+    Returns:
+        The problems, in the order of the environments.
+
     Raises:
         gymnasium.error.Error: As in `drive`, except that instances may differ.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> from posefit_envs import drive_each
+        >>> many = gym.make_vec("posefit_envs:posefit/FitImage-v1", num_envs=2)
+        >>> problems = drive_each(many, "pso", instances=[3, 4], evaluations=80)
+        >>> [problem.evaluations for problem in problems]
+        [80, 80]
     """
     steps = FitImageSteps(env)
     problems = []
@@ -211,10 +233,22 @@ def track_reference(
             motions of the environment's prior.
         settings: Settings of the tracker.
 
+    Returns:
+        The infos, one for each frame.
+
     Raises:
         gymnasium.error.ResetNeeded: Before the first reset.
         gymnasium.error.Error: For another environment.
         ValueError: If a name or a setting is wrong.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> from posefit_envs import track_reference
+        >>> env = gym.make("posefit_envs:posefit/Track-v1", instance=17)
+        >>> _ = env.reset(seed=0)
+        >>> frames = track_reference(env, "sapso@pca")
+        >>> "committed_mpjpe_mm" in frames[0]
+        True
     """
     bare = env.unwrapped
     if not isinstance(bare, TrackEnv):

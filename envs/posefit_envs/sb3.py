@@ -26,8 +26,21 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
     Options are per environment, and attributes are read per environment. Attributes are
     set, and methods called, for all environments together.
 
+    Args:
+        vector: The vector environment.
+
+    Returns:
+        The environment for Stable-Baselines3.
+
     Raises:
         gymnasium.error.DependencyNotInstalled: Without Stable-Baselines3.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> from posefit_envs import to_sb3_vec_env
+        >>> many = gym.make_vec("posefit_envs:posefit/FitImage-v1", num_envs=4)
+        >>> to_sb3_vec_env(many).num_envs
+        4
     """
     try:
         from stable_baselines3.common.vec_env import VecEnv

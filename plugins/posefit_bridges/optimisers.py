@@ -164,6 +164,7 @@ def nevergrad(
         optimiser: Any = known[variant](
             box, budget=evaluations, num_workers=population_size
         )
+        # the library would begin in the middle of the box
         for proposal in draw_population(space, rng, population_size):
             optimiser.suggest(proposal)
     while True:
@@ -223,6 +224,7 @@ def optuna(
         study = create_study(
             sampler=getattr(samplers, variant)(seed=int(rng.integers(2**31)))
         )
+    # the sampler would begin anywhere, and ignore the prediction
     for proposal in draw_population(space, rng, population_size).tolist():
         study.enqueue_trial(dict(zip(box, proposal, strict=True)))
     while True:

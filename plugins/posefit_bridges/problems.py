@@ -135,7 +135,9 @@ def pymoo_problem(problem: Problem) -> Any:
             out["F"] = problem(x)
 
         def _calc_pareto_front(self, *args: Any, **kwargs: Any) -> list[float] | None:
-            return None if problem.optimum is None else [problem.optimum]
+            if problem.optimum is None:
+                return None
+            return [problem.optimum]
 
     return SilhouetteProblem()
 

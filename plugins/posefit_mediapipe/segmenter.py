@@ -70,7 +70,10 @@ class MediaPipe:
         soft = result.segmentation_mask
         self.facing = _facing(result.pose_world_landmarks)
         self.landmarks = _landmarks(result.pose_landmarks, image.shape[:2])
-        person = empty if soft is None else np.asarray(soft > self._threshold)
+        if soft is None:
+            person = empty
+        else:
+            person = np.asarray(soft > self._threshold)
         return person, empty.copy()
 
 

@@ -133,6 +133,7 @@ class HAGA:
         share = self._rng.uniform(-BEYOND, 1.0 + BEYOND, (n, d))
         # ZHAO2008 (crossover)
         children = mothers + share * displacement(self._space, mothers, fathers)
+        # mutations cool with the selection, so that late generations refine
         width = self._spread * self.temperature() / TEMPERATURES[0]
         mutated = (self._rng.random((n, d)) < self._mutation) & (np.arange(d) < count)
         # ZHAO2008 (mutation)

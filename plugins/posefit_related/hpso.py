@@ -74,6 +74,7 @@ class HPSO:
         self._stage = -1
         self._waiting = 0
         self._x = first_population(space, rng, evaluations)
+        # every stage gets the same share of what the first poses leave of the budget
         self._generations = max(
             (evaluations - len(self._x)) // (self._size * len(self._runs)), 1
         )

@@ -107,6 +107,7 @@ class PSOPF:
         """Resample the particles by their bests' weights, and enter the next frame."""
         weights = weigh(self._pbest_cost, self._sharpness)  # KRZESZOWSKI2010 (weights)
         rows = systematic_rows(weights, self._rng.random(), len(weights))
+        # the next frame's box is centred elsewhere
         moved = converted(space, self._pbest[rows], self._space)
         self._space = space
         self._begin(

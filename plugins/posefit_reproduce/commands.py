@@ -138,7 +138,10 @@ def _named_lines(figures: Mapping[str, Any], group: str = "") -> Iterator[str]:
         if isinstance(value, Mapping):
             yield from _named_lines(value, f"{group}{name}.")
         else:
-            text = f"{value:.4g}" if isinstance(value, float) else str(value)
+            if isinstance(value, float):
+                text = f"{value:.4g}"
+            else:
+                text = str(value)
             yield f"{group + name:50} {text}"
 
 

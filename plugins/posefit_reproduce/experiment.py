@@ -134,6 +134,7 @@ def interval(values: Array, level: float = LEVEL) -> Mean:
     if values.ndim == 0:
         return Mean(float(values), float(values), float(values))
     strata, seeds = np.indices(values.shape)
+    # one seed says nothing about others
     if values.shape[1] < 2:
         return Mean(float(values.mean()), nan, nan)
     return mean_interval(values.ravel(), strata.ravel(), seeds.ravel(), level=level)
@@ -145,6 +146,7 @@ def claims_table(name: str, claims: Sequence[Claim]) -> Table:
     The claim with the most subjects gives their order. All intervals hold together at
     the level: Bonferroni's correction.
     """
+    # facts without chance need no share of the error
     level = 1.0 - (1.0 - LEVEL) / max(sum(claim.values.ndim > 0 for claim in claims), 1)
     texts: dict[str, dict[str, Claim]] = {}
     for claim in claims:

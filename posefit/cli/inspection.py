@@ -24,7 +24,10 @@ def described(offer: Offer) -> dict[str, Any]:
         settings.append(
             {"name": setting.name, "type": setting.type, "default": default}
         )
-    more = {"next_frame": offer.next_frame} if offer.kind == "optimiser" else {}
+    if offer.kind == "optimiser":
+        more = {"next_frame": offer.next_frame}
+    else:
+        more = {}
     return {
         "kind": offer.kind,
         "name": offer.name,
@@ -89,7 +92,10 @@ def _head(offer: Offer) -> str:
 
 def _typed(setting: Setting) -> str:
     """Return a setting with its type or choices, and its default."""
-    default = "" if setting.default is Parameter.empty else f" = {setting.default}"
+    if setting.default is Parameter.empty:
+        default = ""
+    else:
+        default = f" = {setting.default}"
     return f"{setting.name}: {setting.type}{default}"
 
 
@@ -115,6 +121,7 @@ def diagnosis(
         offered = [f"{offer.kind} {offer.name}" for offer in plugin.offers]
         offered += [f"{COMMAND} {command.name}" for command in plugin.commands]
         state: str = plugin.state
+        # a plugin without a marked hook loads without an error, and does nothing
         if state == "loaded" and not offered:
             state = "empty"
         states.add(state)

@@ -31,7 +31,9 @@ def parsed_by(
         try:
             if isinstance(value, tuple):
                 return tuple(map(parse, value))
-            return None if value is None else parse(value)
+            if value is None:
+                return None
+            return parse(value)
         except ValueError as error:
             raise click.BadParameter(str(error)) from None
 
@@ -132,7 +134,10 @@ def track_flags(*names: str) -> list[Decorator]:
         option = declared(field)
         default = field.default
         heading = option.heading or heading
-        unwanted = field.name not in names if names else option.flag == ""
+        if names:
+            unwanted = field.name not in names
+        else:
+            unwanted = option.flag == ""
         if unwanted:
             continue
         flag = (option.flag or field.name).replace("_", "-")
@@ -150,9 +155,11 @@ def track_flags(*names: str) -> list[Decorator]:
         if option.parse in (int, float):
             kind = "INTEGER" if option.parse is int else "FLOAT"
             words["metavar"] = option.unit or kind
+            # click's own message for a wrong number has no example
             words |= {"type": str, "callback": parsed_by(number_by(option.parse))}
         else:
             words["callback"] = parsed_by(option.parse)
+        # None means that the default depends on the source; the help describes it
         if not isinstance(default, tuple) and default is not None:
             words |= {"default": default, "show_default": True}
         flags.append(make(f"--{flag}", field.name, **words))
@@ -183,7 +190,7 @@ JSON = _result(
     "--json",
     "as_json",
     is_flag=True,
-    help="Print one JSON object and nothing else on stdout.",
+    help="Print only one JSON object on stdout.",
 )
 QUIET = _result("--quiet", is_flag=True, help="Print only the result.")
 EXTRACTION = (

@@ -21,6 +21,7 @@ def plugins(context: click.Context, as_json: bool) -> None:
     from posefit.cli.inspection import described, listing
     from posefit.registry import KINDS, registry
 
+    # plugins may print while they are imported
     with results_alone():
         offers = registry().offers
     descriptions: list[dict[str, Any]] = []
@@ -142,4 +143,6 @@ def check(
 
 def _own(context: click.Context) -> tuple[str, ...]:
     root = context.find_root().command
-    return tuple(root.commands) if isinstance(root, click.Group) else ()
+    if isinstance(root, click.Group):
+        return tuple(root.commands)
+    return ()

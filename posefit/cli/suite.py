@@ -97,7 +97,7 @@ def suite(context: click.Context, as_json: bool) -> None:
     "--json",
     "as_json",
     is_flag=True,
-    help="Print one JSON array and nothing else on stdout.",
+    help="Print only one JSON array on stdout.",
 )
 def suite_run(
     optimiser: str,
@@ -130,6 +130,7 @@ def suite_run(
             instances=numbers,
             infeasible=infeasible,
         )
+        # a function without the dimension is no error, because others have it
         for function in problems.passed_over:
             say(
                 f"function {function.number} is left out: "

@@ -71,6 +71,7 @@ def sweep(
         raise click.UsageError("--out must name a folder for the results, got none")
     with results_alone() if as_json else nullcontext():
         how = {"retry_quarantined": retry_quarantined, "quiet": quiet}
+        # before the plan is read, which may take seconds
         command.file_of(shard)
         cells = Plan.read(plan)
         tell = (lambda _: None) if quiet else say
@@ -138,6 +139,7 @@ def _names(texts: tuple[str, ...]) -> list[str]:
     Commas separate them, except in brackets.
     """
     names = []
+    # names may have brackets with settings, and commas in them
     for text in texts:
         for part in re.split(r",(?![^(]*\))", text):
             if part.strip():

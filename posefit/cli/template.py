@@ -46,6 +46,7 @@ def write_plugin(
             f"name must be new, got {name!r}, which {known[name]} registers already"
         )
     module = name.replace("-", "_")
+    # an installed module of that name would be imported instead, or be hidden
     if (there := find_spec(f"{PROJECT}_{module}")) is not None:
         raise InputError(
             f"name must give a new module, got {name!r}: "
@@ -53,6 +54,7 @@ def write_plugin(
             f"{there.origin or 'sys.path'}"
         )
     class_name = "".join(part.capitalize() for part in module.split("_"))
+    # a plugin may be called `none` or `frame`
     if class_name in TAKEN or iskeyword(class_name):
         class_name += kind.capitalize()
     used = {

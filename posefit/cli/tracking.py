@@ -129,6 +129,7 @@ def _track_live(
     out = options["out"]
     # live frames are treated like a video's
     chosen = _arguments(options, "video")
+    # a stream has no files that these could apply to
     for name in _OF_FILES:
         chosen.pop(name, None)
     frames = track_live(live, progress=shown, **chosen)
@@ -163,7 +164,10 @@ def _print(
         click.echo(table(content))
     else:
         first, *others = brief(content)
-        grade = "good" if content.trust is None else content.trust.grade
+        if content.trust is None:
+            grade = "good"
+        else:
+            grade = content.trust.grade
         click.secho(first, bold=True, fg=COLOURS[grade])
         click.echo("\n".join(others))
     out = options["out"]
@@ -256,12 +260,16 @@ def _arguments(
         medium = options["source"].medium
     options["extraction"] = extraction_of(options, medium)
     if left_out := options.pop("without_subject"):
+        # the default training motions depend on the method and the source
         chosen = TrackOptions(
             method=options["method"],
             settings=options["settings"],
             train=options["train"],
         )
-        motion = options["source"].named[0] if medium == "motion" else None
+        if medium == "motion":
+            motion = options["source"].named[0]
+        else:
+            motion = None
         options["train"] = without_subjects(completed(chosen, motion).train, left_out)
     return options
 
@@ -315,7 +323,9 @@ def extraction_of(
     if settings:
         factory = registry().offer("segmenter", name).factory
         values["settings"] = parse_texts(name, factory, settings)
-    return Extraction(**values) if values else None
+    if values:
+        return Extraction(**values)
+    return None
 
 
 def without_subjects(train: Sequence[Any], subjects: Sequence[str]) -> list[Any]:

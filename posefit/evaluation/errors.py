@@ -140,7 +140,9 @@ def flagged(table: Table, name: str) -> Flagged | None:
 def flagged_share(table: Table, name: str) -> float | None:
     """Return the share of the frames that `flagged` returns, None if it is unknown."""
     frames = flagged(table, name)
-    return None if frames is None else float(frames.frames.sum()) / frames.known
+    if frames is None:
+        return None
+    return float(frames.frames.sum()) / frames.known
 
 
 def evaluated(
@@ -183,7 +185,10 @@ def evaluated(
         iou[k] = by_view[known if any(known) else slice(None)].mean()
         held[k] = not observation.usable
     # if no frame is usable, the figures are of all frames
-    usable = np.ones(len(frames), dtype=bool) if held.all() else ~held
+    if held.all():
+        usable = np.ones(len(frames), dtype=bool)
+    else:
+        usable = ~held
     errors, error_measures = _errors(scene, frames, prior, training, beta)
     certainty, certainty_measures = _certainty(scene, frames, errors.get("swapped"))
     evaluations = np.array([float(frame.evaluations) for frame in frames])
@@ -316,10 +321,14 @@ def _certainty(
         radii = joint_intervals(skeleton, frame.posterior, frame.pose)[:, 1:]
         radii_mm.append(1e3 * radii)
         radius_mm[k] = radii_mm[-1][MAIN_LEVEL].mean()
+        # with both roots at the origin, like the intervals
         if truth is not None:
             off = truth.skeleton.joints(truth.poses[k]) - skeleton.joints(frame.pose)
             inside.append(np.linalg.norm(off, axis=1)[1:] <= radii)
-    swapped_known = None if swapped is None else mean_known(swapped[sides == 0.0])
+    if swapped is None:
+        swapped_known = None
+    else:
+        swapped_known = mean_known(swapped[sides == 0.0])
     measures = {
         "coverage": _by_level(inside),
         "interval_mm": _by_level(radii_mm),
@@ -362,7 +371,9 @@ def _steadiness(scene: Scene, frames: Sequence[Frame]) -> dict[str, Any]:
 def mean_known(values: Array) -> float | None:
     """Return the mean of the finite values (T,), or None if there are none."""
     known = values[np.isfinite(values)]
-    return float(known.mean()) if len(known) else None
+    if len(known):
+        return float(known.mean())
+    return None
 
 
 def nearest(

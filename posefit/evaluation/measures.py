@@ -40,7 +40,9 @@ class Measure:
 
     def number(self, value: float | None) -> str:
         """Return a value with its digits and without its unit, or "-" for None."""
-        return "-" if value is None else f"{self.factor * value:,.{self.digits}f}"
+        if value is None:
+            return "-"
+        return f"{self.factor * value:,.{self.digits}f}"
 
     def shown(self, value: float | None) -> str:
         """Return a value with its label and unit, such as `MPJPE 18 mm`."""
@@ -171,7 +173,7 @@ class Measures:
         "mm a step",
         0,
         "distance that a standing foot moves along the ground, the mean over steps: "
-        "about 20 in motion capture; a foot stands while the true one does, or while "
+        "about 20 in motion capture; a foot stands while the true foot does, or while "
         "it is low and slow if the truth is unknown",
     )
     held_frames: int = _figure(

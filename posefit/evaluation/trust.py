@@ -89,7 +89,9 @@ def depth_scatter(depths: Array, usable: NDArray[np.bool_], fps: float) -> float
         if len(near) >= MIN_SMOOTH_FRAMES:
             path = np.polynomial.Polynomial.fit(near - k, depths[near], 2)
             away.append(abs(depths[k] - path(0.0)) / depths[k])
-    return float(np.quantile(away, SCATTER_QUANTILE)) if away else None
+    if away:
+        return float(np.quantile(away, SCATTER_QUANTILE))
+    return None
 
 
 def hidden_share(usable: NDArray[np.bool_], cut: NDArray[np.bool_]) -> float:
@@ -119,7 +121,7 @@ def hidden_share(usable: NDArray[np.bool_], cut: NDArray[np.bool_]) -> float:
 
 
 def stance_spread(joints: Array, in_stance: NDArray[np.bool_]) -> float | None:
-    """Return the spread of the heights at which feet stand, in metres.
+    """Return the spread of the heights at which feet touch the ground, in metres.
 
     It is the standard deviation over stances of the height of the foot's ball.
 
@@ -134,7 +136,9 @@ def stance_spread(joints: Array, in_stance: NDArray[np.bool_]) -> float | None:
     for ball, flags in zip(BALLS, in_stance.T, strict=True):
         for start, stop in runs(flags):
             heights.append(joints[start:stop, ball, 1].mean())
-    return float(np.std(heights)) if len(heights) > 1 else None
+    if len(heights) > 1:
+        return float(np.std(heights))
+    return None
 
 
 def training_distances(
@@ -154,6 +158,7 @@ def training_distances(
     """
     both = np.concatenate([poses, mirrored_poses(skeleton, poses)])
     nearest = np.full(2 * len(poses), np.inf)
+    # a pose is as familiar in any direction
     both[:, 0] = 0.0
     for motion in training:
         others = motion.poses[:: max(1, round(TRAINING_SECONDS * motion.fps))].copy()
@@ -193,13 +198,16 @@ def explained_share(
         body = project(scene.body, camera, frame.pose, frame.translation)
         observed = observation.silhouettes[0].mask
         reach = max(reach, longer_side(observed))
+        # the body covers the place that it left, too, because that changes as well
         if before and is_usable:
             then, old_body, old_observed = before[0]
             counts += covered_pixels(
                 image, then, body | old_body, observed | old_observed, reach
             )
         before.append((image, body, observed))
-    return float(counts[0] / counts[1]) if counts[1] else None
+    if counts[1]:
+        return float(counts[0] / counts[1])
+    return None
 
 
 def covered_pixels(
@@ -224,7 +232,10 @@ def covered_pixels(
         return 0, 0
     changed = changed_pixels(image, then)
     moved, inside = moved_pixels(changed, region, body, reach, CLOTHES)
-    return (inside, moved) if moved > MIN_MOVED * body.sum() else (0, 0)
+    # a few pixels of noise say nothing about the body
+    if moved > MIN_MOVED * body.sum():
+        return (inside, moved)
+    return (0, 0)
 
 
 Grade = Literal["good", "doubtful", "do not use"]
@@ -296,12 +307,12 @@ class Trust:
     )
     foot_share: float | None = _sign(
         (1.0, 0.8, 1.0),
-        "a foot stands in only {foot_share:.0%} of the frames",
-        "a foot stands in {foot_share:.0%} of frames",
+        "a foot is on the ground in only {foot_share:.0%} of the frames",
+        "a foot is on the ground in {foot_share:.0%} of frames",
     )
     stance_spread_m: float | None = _sign(
         (0.0, 0.15, 0.6),
-        "feet stand at heights {stance_spread_m:.2f} m apart",
+        "feet touch the ground at heights {stance_spread_m:.2f} m apart",
         "at heights {stance_spread_m:.2f} m apart",
     )
     explained: float | None = _sign(
@@ -395,7 +406,9 @@ def grade_of(signs: Sequence[tuple[Grade, str]]) -> Grade:
     """
     if not signs:
         return "good"
-    return "do not use" if len(signs) >= UNUSABLE_TOGETHER else signs[0][0]
+    if len(signs) >= UNUSABLE_TOGETHER:
+        return "do not use"
+    return signs[0][0]
 
 
 def sentence(figures: Mapping[str, Any], signs: Sequence[tuple[Grade, str]]) -> str:
@@ -503,7 +516,7 @@ def trust_of(
         "stance_spread_m": _figure(
             {TOO_FEW: few},
             lambda: stance_spread(joints, in_stance),
-            "no foot stands twice",
+            "no foot touches the ground twice",
         ),
         "explained": _figure(
             {MASKS_ALONE: scene.pictures is None, MOVES: scene.camera_moves},
@@ -612,6 +625,9 @@ def _size(
             observed = longer_side(silhouette.mask)
             body = project(scene.body, camera, frame.pose, frame.translation)
             fitted = longer_side(body)
+            # a mask that the picture cuts has no size
             if observed and fitted:
                 ratios.append(observed / fitted)
-    return float(np.median(ratios)) if ratios else None
+    if ratios:
+        return float(np.median(ratios))
+    return None

@@ -88,7 +88,7 @@ class ObservedFrames:
     All of them are drawn on the CPU, even if the silhouettes are on a device.
     """
 
-    observed: Sequence[Observed] = field(repr=False)  # one a camera
+    observed: Sequence[Observed] = field(repr=False)  # one for each camera
     borders: Array = field(repr=False)  # (f, views, 4) pixels, see `Silhouette.extent`
     # for each frame, the views that show something, or all if none does
     known: Sequence[Sequence[int]] = field(repr=False)
@@ -105,10 +105,11 @@ class ObservedFrames:
             borders.append([each.extent for each in row])
             views = range(len(row))
             known.append([view for view in views if row[view].known] or views)
-        observed = [
-            Observed(*(np.array(part) for part in zip(*view, strict=True)))
-            for view in zip(*stacks, strict=True)
-        ]
+        observed = []
+        for view in zip(*stacks, strict=True):
+            observed.append(
+                Observed(*(np.array(part) for part in zip(*view, strict=True)))
+            )
         return cls(observed, np.array(borders), known)
 
     def areas(

@@ -49,6 +49,15 @@ class Space(Protocol):
     """The box [-1, 1]^d as an optimiser knows it; part of it is feasible.
 
     `SearchSpace` is one.
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit.testing.toy import Toy
+        >>> space = Toy(2)
+        >>> space.dimensions, space.start
+        (2, None)
+        >>> space.feasible(np.array([[0.0, 0.0], [2.0, 0.0]])).tolist()
+        [True, False]
     """
 
     @property
@@ -181,7 +190,7 @@ def draw_population(space: Space, rng: np.random.Generator, count: int) -> Array
         drawn = _drawn(space, None, rng, count)
     if drawn is None:
         raise InputError(
-            "the prior must find some of its range feasible,"
+            "some of the prior's range must be feasible,"
             f" got none in {REDRAWS} x {count} draws"
         )
     return drawn

@@ -58,8 +58,8 @@ def revived(
 
     Args:
         state: The state, from `carried`.
-        space: The space of another frame of the same track. It gives what the state
-            does not have.
+        space: The space of another frame of the same track, for the parts that the
+            state does not have.
         rng: The generator of the filter.
         evaluations: The budget of a search.
         make: Builds the filter.
@@ -124,7 +124,9 @@ def _kept(value: Any, space: Any, rng: Any) -> Any:
 def _made(kept: Any, space: Any = None, rng: Any = None) -> Any:
     """Return the value from which `_kept` made this."""
     if not isinstance(kept, Mapping):
-        return kept.copy() if isinstance(kept, np.ndarray) else kept
+        if isinstance(kept, np.ndarray):
+            return kept.copy()
+        return kept
     kind = kept[KIND]
     if kind in ("space", "rng"):
         return space if kind == "space" else rng
@@ -137,10 +139,14 @@ def _made(kept: Any, space: Any = None, rng: Any = None) -> Any:
     values = kept["values"]
     if kind in ("list", "tuple"):
         members = [_made(value, space, rng) for value in values]
-        return members if kind == "list" else tuple(members)
+        if kind == "list":
+            return members
+        return tuple(members)
     if kind not in ("dict", "start"):
         raise InputError(f"a kept value must be of a known kind, got {kind}")
     if kind == "start":
         values = values["values"]
     made = {name: _made(value, space, rng) for name, value in values.items()}
-    return Start(**made) if kind == "start" else made
+    if kind == "start":
+        return Start(**made)
+    return made

@@ -52,9 +52,15 @@ def between(
         >>> from posefit.plugin import between
         >>> between("quantile", 0.99, 0.0, 1.0)
     """
-    inside = low <= value <= high if ends else low < value < high
+    if ends:
+        inside = low <= value <= high
+    else:
+        inside = low < value < high
     if not inside:
-        way = f"in {low:g} to {high:g}" if ends else f"between {low:g} and {high:g}"
+        if ends:
+            way = f"in {low:g} to {high:g}"
+        else:
+            way = f"between {low:g} and {high:g}"
         raise InputError(f"{name} must lie {way}, got {cut(str(value))}")
 
 
@@ -113,11 +119,10 @@ def whole(name: str, value: object, least: int) -> int:
 def finite_number(name: str, value: object) -> float:
     """Return a finite number as a float. Raises InputError for anything else."""
     try:
-        number = (
-            float(value)
-            if isinstance(value, Real) and not isinstance(value, bool)
-            else math.nan
-        )
+        if isinstance(value, Real) and not isinstance(value, bool):
+            number = float(value)
+        else:
+            number = math.nan
     except OverflowError:  # a whole number of any size
         number = math.inf
     if not math.isfinite(number):
@@ -131,7 +136,10 @@ def pair(name: str, value: object, what: str) -> tuple[Any, Any]:
     Raises InputError for anything else. `what` names what was expected.
     """
     # an array has `tolist`
-    values = value.tolist() if hasattr(value, "tolist") else value
+    if hasattr(value, "tolist"):
+        values = value.tolist()
+    else:
+        values = value
     if not isinstance(values, tuple | list) or len(values) != 2:
         raise InputError(f"{name} must be {what}, got {quoted(value)}")
     return values[0], values[1]
@@ -156,7 +164,10 @@ def one_of(name: str, value: object, known: Iterable[object]) -> None:
     """
     known = tuple(known)
     if value not in known:
-        hint = suggestion(value, map(str, known)) if isinstance(value, str) else ""
+        if isinstance(value, str):
+            hint = suggestion(value, map(str, known))
+        else:
+            hint = ""
         listed = ", ".join(map(str, known))
         raise InputError(f"{name} must be one of {listed}, got {quoted(value)}{hint}")
 

@@ -167,7 +167,10 @@ class Strategy:
             math.sqrt(1.0 - (1.0 - c_sigma) ** (2.0 * (self.generation + 1.0))) * chi
         )
         # HANSEN2016 (h_sigma)
-        h_sigma = 1.0 if length < (1.4 + 2.0 / (d + 1.0)) * usual else 0.0
+        if length < (1.4 + 2.0 / (d + 1.0)) * usual:
+            h_sigma = 1.0
+        else:
+            h_sigma = 0.0
         fresh = h_sigma * math.sqrt(c_c * (2.0 - c_c) * mu_eff) * step
         self.path = (1.0 - c_c) * self.path + fresh  # HANSEN2016 (45)
         white = y[mu:] @ self.whitening
@@ -242,7 +245,7 @@ class CMAES:
         """Start around a feasible prediction, or around a fresh draw."""
         if not (np.isfinite(spread).all() and (spread >= 0.0).all() and spread.any()):
             raise InputError(
-                "spread must be above 0 in some coordinate and negative in none,"
+                "spread must be 0 or more in each coordinate, and above 0 in one,"
                 f" got {cut(str(spread))}"
             )
         start = self.space.start

@@ -426,6 +426,16 @@ def contour_fit(
     Returns:
         The pose (66,), the place (3,), and the number of evaluations that the steps
         cost.
+
+    Example:
+        >>> from posefit.plugin import contour_fit
+        >>> from posefit.testing.tracker_rules import scene
+        >>> task, walk, observations = scene()
+        >>> start = (walk.poses[0] + 0.05, walk.translations[0])
+        >>> fit = contour_fit(task, observations[0], start, (0.2, 0.1), evaluations=270)
+        >>> pose, place, evaluations = fit
+        >>> pose.shape, place.shape, evaluations
+        ((66,), (3,), 270)
     """
     pose, place = (np.array(part, dtype=np.float64)[None] for part in start)
     scales = ROBUST_SCALES[: max(int(evaluations // STEP_EVALUATIONS), 0)]

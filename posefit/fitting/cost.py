@@ -90,8 +90,8 @@ class SilhouetteCost:
     """The cost of proposals for one observation, a pure function. SAPSO (4).
 
     Call it with proposals (n, d) of its space for their costs (n,), 0 to 100: the mean
-    over the views. The cost of a proposal has the same bits whatever the other
-    proposals are, and with any number of threads. A `Problem` counts the calls.
+    over the views. The cost of a proposal has the same bits in any population
+    and with any number of threads. A `Problem` counts the calls.
 
     Args:
         body: the person's body.
@@ -134,7 +134,7 @@ class SilhouetteCost:
     def __post_init__(self) -> None:
         if len(self.cameras) != len(self.silhouettes) or not self.cameras:
             raise InputError(
-                f"silhouettes must be one a camera ({len(self.cameras)}),"
+                f"silhouettes must be one for each camera ({len(self.cameras)}),"
                 f" got {len(self.silhouettes)}"
             )
         for camera, silhouette in zip(self.cameras, self.silhouettes, strict=True):
@@ -223,10 +223,9 @@ class SilhouetteCost:
 
     @cached_property
     def _drawings(self) -> Sequence[tuple[tuple[Any, ...], Silhouette]]:
-        views = [
-            (drawing_of(self.body, camera, silhouette), silhouette)
-            for camera, silhouette in zip(self.cameras, self.silhouettes, strict=True)
-        ]
+        views = []
+        for camera, silhouette in zip(self.cameras, self.silhouettes, strict=True):
+            views.append((drawing_of(self.body, camera, silhouette), silhouette))
         return known_views(views, self.silhouettes)
 
     def _cost(self, poses: Array, translations: Array) -> Array:

@@ -18,8 +18,8 @@ def as_numpy(name: str, values: Any) -> tuple[Any, Callable[[Array], Any]]:
 
     An array on the CPU is not copied. From another device it is copied, and its results
     are copied back. Results have the type of the values if that is a floating type:
-    float32 of JAX or PyTorch gives float32. NumPy's arrays, and values without
-    `__dlpack__`, are returned as they are, and so are their results.
+    float32 of JAX or PyTorch gives float32. NumPy's arrays, values without
+    `__dlpack__`, and their results are returned unchanged.
 
     Args:
         name: The name of the values in messages.
@@ -38,7 +38,10 @@ def as_numpy(name: str, values: Any) -> tuple[Any, Callable[[Array], Any]]:
         return values, lambda results: results
     try:
         here = values.__dlpack_device__()[0] == CPU
-        array = np.from_dlpack(values) if here else np.from_dlpack(values, device="cpu")
+        if here:
+            array = np.from_dlpack(values)
+        else:
+            array = np.from_dlpack(values, device="cpu")
     except (AttributeError, BufferError, RuntimeError, TypeError) as error:
         kind_of_array = f"{type(values).__module__}.{type(values).__name__}"
         raise InputError(
@@ -50,9 +53,15 @@ def as_numpy(name: str, values: Any) -> tuple[Any, Callable[[Array], Any]]:
         library = values.__array_namespace__()
     else:  # PyTorch
         library = sys.modules[type(values).__module__.partition(".")[0]]
-    kind = array.dtype if array.dtype.kind == "f" else np.dtype(np.float64)
+    if array.dtype.kind == "f":
+        kind = array.dtype
+    else:
+        kind = np.dtype(np.float64)
     # CuPy has no argument for the device: it uses the current one
-    place = {} if here or library.__name__ == "cupy" else {"device": values.device}
+    if here or library.__name__ == "cupy":
+        place = {}
+    else:
+        place = {"device": values.device}
     return array, lambda results: library.asarray(
         results.astype(kind, copy=False), **place
     )

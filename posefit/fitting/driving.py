@@ -247,4 +247,6 @@ def _short(value: object) -> str:
     text = str(np.asarray(value).tolist())
     if isinstance(value, float):
         text = f"{value:.6g}"
-    return text if len(text) <= 80 else text[:77] + "..."
+    if len(text) <= 80:
+        return text
+    return text[:77] + "..."

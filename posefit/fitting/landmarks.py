@@ -40,9 +40,9 @@ def landmark_likelihoods(
 ) -> Array:
     """Return the logarithms of the likelihoods (n, K, 2) of landmarks, given poses.
 
-    K are the groups of each view. The last axis is for the group as it is, and with
-    left and right exchanged. A joint counts by its confidence. Distances have a Cauchy
-    distribution.
+    K are the groups of each view. The last axis is for the unchanged group, and for
+    the group with left and right exchanged. A joint counts by its confidence.
+    Distances have a Cauchy distribution.
 
     Args:
         skeleton: The person's skeleton.

@@ -49,10 +49,11 @@ def geodesic_degrees(truth: Array, estimate: Array) -> Array:
         rotation_from_root_angles(truth[:, :3]),
         rotation_from_root_angles(estimate[:, :3]),
     )
-    inner = [
-        rotation_from_joint_angles(poses[:, 3:].reshape(len(poses), -1, 3))
-        for poses in (truth, estimate)
-    ]
+    inner = []
+    for poses in (truth, estimate):
+        inner.append(
+            rotation_from_joint_angles(poses[:, 3:].reshape(len(poses), -1, 3))
+        )
     return np.asarray(
         np.degrees(np.column_stack([root, geodesic(*inner)])).mean(axis=1)
     )
@@ -100,4 +101,6 @@ def skill(error: float, baseline: float) -> float | None:
 
     None if the baseline is 0.
     """
-    return 1.0 - error / baseline if baseline > 0.0 else None
+    if baseline > 0.0:
+        return 1.0 - error / baseline
+    return None

@@ -38,7 +38,19 @@ class Optimiser(Protocol):
 
 
 class Filter(Optimiser, Protocol):
-    """An optimiser that carries its particles from frame to frame."""
+    """An optimiser that carries its particles from frame to frame.
+
+    Example:
+        >>> import numpy as np
+        >>> import posefit
+        >>> from posefit.testing.toy import Toy
+        >>> search = posefit.optimiser("annealed")(Toy(2), np.random.default_rng(0))
+        >>> proposals = search.ask()
+        >>> search.tell(proposals, (proposals**2).sum(axis=1))
+        >>> search.advance(Toy(2))  # the next frame
+        >>> search.ask().shape[1]
+        2
+    """
 
     def advance(self, space: Space) -> None:
         """Continue with the next frame.

@@ -25,7 +25,7 @@ class Latents(Protocol):
     """Maps joint angles (n, 63) to latents (n, m) and back.
 
     A fitted `Prior` is one, and so is a map that needs no fit. `inverse_transform` and
-    `feasible` must return the same bits for a row whatever the other rows are.
+    `feasible` must return the same bits for a row next to any other rows.
     """
 
     low: Array  # (m,) the range of the latents, constraint 1

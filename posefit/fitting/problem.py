@@ -7,8 +7,8 @@
     print(problem.best_cost, problem.evaluations)
 
 Everything that posefit searches is a problem: a frame of a track, a person's build, a
-numbered instance of a suite, an episode of an environment. The problem counts its
-evaluations and remembers its best proposal; nothing else does.
+numbered instance of a suite, an episode of an environment. Only the problem counts
+its evaluations and remembers its best proposal.
 """
 
 import warnings
@@ -122,7 +122,7 @@ class Problem:
         space: the box, as an optimiser knows it.
         budget: the largest number of evaluations; None for any number.
         repair: moves infeasible proposals (n, d) before they are evaluated; by default
-            they are evaluated as they are.
+            they are not moved.
         noisy: returns the noisy costs (n,) that a call returns, from the proposals
             (n, d) and the number of evaluations before them. By default a call returns
             `cost`. The best and the trace are always of `cost`.
@@ -211,7 +211,9 @@ class Problem:
         if self._noisy is not None:
             measured = self._noisy(rows, self.evaluations)
         self.count(rows, costs)
-        return float(measured[0]) if checked.ndim == 1 else back(measured)
+        if checked.ndim == 1:
+            return float(measured[0])
+        return back(measured)
 
     def count(self, rows: Array, costs: Array) -> None:
         """Count proposals (n, d) with costs (n,), and remember the best. SAPSO (5).
@@ -252,7 +254,9 @@ class Problem:
     @property
     def remaining_evaluations(self) -> float:
         """The number of evaluations left in the budget; infinite without a budget."""
-        return np.inf if self.budget is None else self.budget - self.evaluations
+        if self.budget is None:
+            return np.inf
+        return self.budget - self.evaluations
 
     @property
     def best(self) -> Array:
@@ -317,7 +321,9 @@ class Problem:
     def initial_solution(self) -> Array:
         """The proposal (d,) to start from: the prediction, or the middle of the box."""
         start = self.space.start
-        return np.zeros(self.dimension) if start is None else start.mean.copy()
+        if start is None:
+            return np.zeros(self.dimension)
+        return start.mean.copy()
 
     def initial_solution_proposal(self, restart: int = 0) -> Array:
         """Return the proposal (d,) to start from, or a random one for a restart."""

@@ -79,7 +79,7 @@ PROPORTIONS_CORRELATION = np.array(
     ]
 )
 # The share of its variance that the ratio of thigh to shank keeps in the fit, so small
-# that the fit leaves it as it is. In a mask, the knee is where the flesh of the thigh
+# that the fit does not change it. In a mask, the knee is where the flesh of the thigh
 # and that of the shank meet. Most flesh is behind the bones, by 2 cm (Dumas et al.
 # 2007): a knee that is a little bent seems to be higher than it is, by more than the
 # 6 % by which people's ratios vary, and in every frame and every view.
@@ -213,8 +213,8 @@ def fit_shape(
 ) -> Shape:
     """Return the shape that fits all observations best, fitted in turns with the poses.
 
-    The uncertainty of the factors is not known yet: their `spread` is that of all
-    people.
+    The uncertainty of the factors is not known yet: their `spread` is the spread
+    among people.
 
     Args:
         body: The body that is scaled.

@@ -71,7 +71,7 @@ class SearchSpace:
     )
     # None: the first population is drawn uniformly from the box
     start: Start | None = None
-    # None: pitch and roll are those of the pose
+    # None: pitch and roll are in the pose
     tilt: Tilt | None = field(default=None, repr=False)
     root_order: RootOrder = "yaw_first"  # Interpretation S3; "xyz" has no tilt
     # (d,) coordinates of the box's middle
@@ -167,7 +167,10 @@ class SearchSpace:
         poses = np.empty((n, ANGLES))
         translations = np.empty((n, 3))
         latents = np.empty((n, m))
-        tilt = np.zeros((3 + m, 2)) if self.tilt is None else self.tilt.mean
+        if self.tilt is None:
+            tilt = np.zeros((3 + m, 2))
+        else:
+            tilt = self.tilt.mean
         if not unpack_proposals(
             proposals,
             self.centre,

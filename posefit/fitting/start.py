@@ -74,22 +74,23 @@ def starts_in(
     space = cost.space
     side = min(cost.silhouettes[0].size)
     factor = min(max(side // MIN_SMALL_SIDE, 1), MAX_FACTOR)
-    projected = [
-        space.proposals(coordinates_of(space, mode.poses, mode.translations))
-        for _, mode in modes
-    ]
-    costs = [
-        cost.coarser(factor)(poses) + INFEASIBLE_COST * ~space.feasible(poses)
-        for poses in projected
-    ]
+    projected = []
+    for _, mode in modes:
+        projected.append(
+            space.proposals(coordinates_of(space, mode.poses, mode.translations))
+        )
+    costs = []
+    for poses in projected:
+        costs.append(
+            cost.coarser(factor)(poses) + INFEASIBLE_COST * ~space.feasible(poses)
+        )
     least = min(float(each.min()) for each in costs)
     weights = [float(np.exp((least - each) / TEMPERATURE).sum()) for each in costs]
     spread = np.full(space.dimensions, MODE_SPREAD)
     velocity = np.zeros(space.dimensions)
-    starts = [
-        Start(poses[each.argmin()], spread, velocity, weight)
-        for poses, each, weight in zip(projected, costs, weights, strict=True)
-    ]
+    starts = []
+    for poses, each, weight in zip(projected, costs, weights, strict=True):
+        starts.append(Start(poses[each.argmin()], spread, velocity, weight))
     return sorted(starts, key=lambda start: -start.weight)
 
 

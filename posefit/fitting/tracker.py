@@ -111,7 +111,9 @@ class Frame:
     @property
     def modes(self) -> Sequence[Mode]:
         """The modes of the posterior, the likeliest first."""
-        return () if self.posterior is None else self.posterior.modes
+        if self.posterior is None:
+            return ()
+        return self.posterior.modes
 
     def __post_init__(self) -> None:
         if self.lost is not None and not 0.0 <= self.lost <= 1.0:
@@ -182,6 +184,25 @@ class Tracker(Protocol):
 
     It takes one observation before it yields a frame, unless it is registered with
     `looks_ahead`.
+
+    Example:
+        >>> import numpy as np
+        >>> import posefit
+        >>> from posefit.plugin import Frame, areas, mismatch
+        >>> class Still:
+        ...     def __init__(self, task):
+        ...         self.task = task
+        ...
+        ...     def track(self, observations, rng):
+        ...         pose = self.task.training[0].poses[0]
+        ...         for seen in observations:
+        ...             view = self.task.body, self.task.cameras[0], seen.silhouettes[0]
+        ...             place = np.array(seen.translation)
+        ...             counts = areas(*view, pose[None], place[None])
+        ...             cost = float(mismatch(counts)[0])
+        ...             yield Frame(pose, place, cost, counts, evaluations=1)
+        >>> posefit.track("walk", method=Still, frames=(0, 2)).joints.shape
+        (2, 27, 3)
     """
 
     def track(
@@ -197,7 +218,23 @@ Follow = Callable[[Task, Iterable[Observation], np.random.Generator], Iterator[F
 
 
 class Initialiser(Protocol):
-    """Guesses which poses an observation may show; nothing to inherit."""
+    """Guesses which poses an observation may show; nothing to inherit.
+
+    Example:
+        >>> from posefit.plugin import Posterior
+        >>> from posefit.testing.tracker_rules import scene
+        >>> class First:
+        ...     def __init__(self, task):
+        ...         self.task = task
+        ...
+        ...     def posterior(self, observation):
+        ...         pose = self.task.training[0].poses[:1]
+        ...         place = self.task.training[0].translations[:1]
+        ...         return Posterior(pose, place, [1.0])
+        >>> task, _, observations = scene()
+        >>> First(task).posterior(observations[0]).poses.shape
+        (1, 66)
+    """
 
     def posterior(self, observation: Observation) -> Posterior | None:
         """Return weighted poses with translations, or None for a blind search."""
@@ -221,7 +258,9 @@ def guessed_modes(
     if task.evaluations < MIN_GUESSED_EVALUATIONS:
         return ()
     posterior = task.start(task).posterior(observation)
-    return () if posterior is None else modes_apart(task.body.skeleton, posterior)
+    if posterior is None:
+        return ()
+    return modes_apart(task.body.skeleton, posterior)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -318,11 +357,10 @@ class Predictor:
             tilt=self._tilt,
             root_order="xyz" if prediction.variant == "paper" else "yaw_first",
         )
-        earlier = [
-            frame.details[COORDINATES]
-            for frame in task.before
-            if COORDINATES in frame.details
-        ]
+        earlier = []
+        for frame in task.before:
+            if COORDINATES in frame.details:
+                earlier.append(frame.details[COORDINATES])
         # coordinates of the latest gbest, the newest last
         self._latest: list[Array] = earlier[-HISTORY_FRAMES:]
         self.guess_evaluations = 0  # evaluations of the guess of the latest start
@@ -433,6 +471,21 @@ class SynthesisTracker:
 
     `make` builds an optimiser from a space, a generator and the evaluations of its
     search. `next_frame` tells what becomes of it in the next frame.
+
+    Example:
+        >>> import numpy as np
+        >>> import posefit
+        >>> from posefit import SynthesisTracker
+        >>> from posefit.testing.tracker_rules import scene
+        >>> task, _, observations = scene()
+        >>> prior = posefit.prior("pca")().fit(task.angles)
+        >>> pso = posefit.optimiser("pso")
+        >>> def make(space, rng, evaluations):
+        ...     return pso(space, rng, population_size=20)
+        >>> tracker = SynthesisTracker(task, prior, make)
+        >>> frames = tracker.track(observations[:2], np.random.default_rng(0))
+        >>> [frame.pose.shape for frame in frames]
+        [(66,), (66,)]
     """
 
     task: Task

@@ -111,7 +111,7 @@ class Checked:
             raise _broken_by(self.name, what, error) from error
         if self._drawn.poses:
             rule = (
-                f"leave evaluations to the search, got {self._drawn.poses:g} of its own"
+                f"leave evaluations to the search, got {self._drawn.poses:g} by itself"
             )
             raise BrokenRuleError(f"{self.name}: {what} must {rule}")
         return answer
@@ -135,7 +135,10 @@ def check_population(proposals: Any, space: Space, name: str) -> None:
     plain = type(proposals) is np.ndarray
     rule = ""
     if not plain or proposals.shape[1:] != (space.dimensions,):
-        came = f"shape {proposals.shape}" if plain else type(proposals).__name__
+        if plain:
+            came = f"shape {proposals.shape}"
+        else:
+            came = type(proposals).__name__
         rule = f"an array of shape (n, {space.dimensions}), got {came}"
     elif proposals.dtype.kind != "f":
         rule = f"numbers of type float64, got {proposals.dtype}"
@@ -153,7 +156,7 @@ def plugin_errors(
 ) -> Iterator[None]:
     """Turn exceptions of the body, SystemExit too, into a BrokenRuleError.
 
-    A BrokenRuleError stays as it is: it names another plugin, which this one called.
+    A BrokenRuleError is not changed: it names another plugin, which this one called.
 
     Args:
         name: The name of the plugin.
@@ -179,21 +182,18 @@ def _broken_by(name: str, what: str, error: BaseException) -> BrokenRuleError:
             f"{name}: {what} must not end the program, got SystemExit: {error.code}"
         )
     # where the plugin raised it, or passed it on from a library
-    frames = [
-        frame
-        for frame in extract_tb(error.__traceback__)
-        if POSEFIT not in Path(frame.filename).parents
-    ]
-    of_plugin = [
-        frame
-        for frame in frames
-        if Path(frame.filename).parent == Path(frames[0].filename).parent
-    ]
-    place = (
-        f" ({Path(of_plugin[-1].filename).name}:{of_plugin[-1].lineno})"
-        if of_plugin
-        else ""
-    )
+    frames = []
+    for frame in extract_tb(error.__traceback__):
+        if POSEFIT not in Path(frame.filename).parents:
+            frames.append(frame)
+    of_plugin = []
+    for frame in frames:
+        if Path(frame.filename).parent == Path(frames[0].filename).parent:
+            of_plugin.append(frame)
+    if of_plugin:
+        place = f" ({Path(of_plugin[-1].filename).name}:{of_plugin[-1].lineno})"
+    else:
+        place = ""
     return BrokenRuleError(
         f"{name}: {what} must not fail, got {type(error).__name__}: {error}{place}"
     )

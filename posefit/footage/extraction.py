@@ -43,6 +43,11 @@ class Extraction:
     Raises:
         InputError: A setting is missing, unknown or out of range.
 
+    Example:
+        >>> from posefit import Extraction
+        >>> extraction = Extraction(roi=(0, 420, 1520, 532), person=2)
+        >>> extraction.name
+        'mixture'
     """
 
     method: str | None = None

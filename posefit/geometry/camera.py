@@ -269,7 +269,10 @@ class Camera:
             InputError: The text is not valid; the message names the key.
 
         """
-        text = path if isinstance(path, str) and path.lstrip().startswith("{") else ""
+        if isinstance(path, str) and path.lstrip().startswith("{"):
+            text = path
+        else:
+            text = ""
         path = "camera" if text else path
         expected = f"{path}: expected a JSON object with {', '.join(_KEYS)}"
         text = text or read_text(path, LARGEST_FILE)

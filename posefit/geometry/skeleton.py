@@ -69,7 +69,9 @@ def side(bone: str) -> Side:
 
 def kind(bone: str) -> str:
     """Return a bone's name without its side: `femur` for `lfemur` and `rfemur`."""
-    return bone if side(bone) == "middle" else bone[1:]
+    if side(bone) == "middle":
+        return bone
+    return bone[1:]
 
 
 def both(kind: str) -> tuple[str, str]:
@@ -85,7 +87,9 @@ SIDES: tuple[Side, ...] = tuple(side(name) for name in JOINTS)
 
 def angle_index(joint: int) -> int:
     """Return the index in a pose of a joint's first angle, or -1 for an end joint."""
-    return 3 + 3 * INNER.index(joint) if joint in INNER else -1
+    if joint in INNER:
+        return 3 + 3 * INNER.index(joint)
+    return -1
 
 
 def channel_angles(bone: str, channels: Sequence[str]) -> list[int]:
@@ -93,7 +97,10 @@ def channel_angles(bone: str, channels: Sequence[str]) -> list[int]:
 
     An end bone or an unknown bone has none.
     """
-    start = angle_index(JOINTS.index(bone)) if bone in JOINTS else -1
+    if bone in JOINTS:
+        start = angle_index(JOINTS.index(bone))
+    else:
+        start = -1
     if start <= 0:
         return []
     return [start + "xyz".index(channel[1]) for channel in channels]

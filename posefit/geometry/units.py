@@ -53,4 +53,6 @@ def unit_of(stature: float) -> Unit | None:
         return abs(float(math.log(stature * METRES[unit])) - middle)
 
     best = min(UNITS, key=distance)
-    return best if low <= stature * METRES[best] <= high else None
+    if low <= stature * METRES[best] <= high:
+        return best
+    return None

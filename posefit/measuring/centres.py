@@ -33,7 +33,9 @@ _PLACES = {
 def place_name(joint: str) -> str:
     """Return a joint's anatomical name: `left_knee` for `lfemur`."""
     place = _PLACES[kind(joint)]
-    return place if side(joint) == "middle" else f"{side(joint)}_{place}"
+    if side(joint) == "middle":
+        return place
+    return f"{side(joint)}_{place}"
 
 
 PLACES = tuple(place_name(joint) for joint in JOINTS)  # (27,) in the order of JOINTS

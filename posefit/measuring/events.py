@@ -140,4 +140,6 @@ def _between(series: Array, k: int) -> float:
     """Return the maximum of the parabola through a value and its neighbours."""
     before, here, after = series[k - 1 : k + 2]
     bend = before - 2.0 * here + after
-    return k + 0.5 * float((before - after) / bend) if bend < 0.0 else float(k)
+    if bend < 0.0:
+        return k + 0.5 * float((before - after) / bend)
+    return float(k)

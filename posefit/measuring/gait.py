@@ -331,7 +331,10 @@ def _why_not(
     stance = _values(steps, "stance_share")
     froude = speed**2 / (GRAVITY * _leg(motion))  # ALEXANDER1989 (Froude number)
     if froude > RUNNING_FROUDE or (stance and np.mean(stance) < MIN_STANCE_SHARE):
-        how = f", at {speed:.1f} m/s" if speed >= MIN_SPEED else " in one place"
+        if speed >= MIN_SPEED:
+            how = f", at {speed:.1f} m/s"
+        else:
+            how = " in one place"
         return f"the person runs{how}"
     timed = _values(steps, "step_seconds")
     if len(timed) < MIN_STEPS:
@@ -340,7 +343,10 @@ def _why_not(
             "or too little is known"
         )
     in_place = abs(speed) < MIN_SPEED
-    least = MIN_STEPS_SHARE_IN_PLACE if in_place else MIN_STEPS_SHARE
+    if in_place:
+        least = MIN_STEPS_SHARE_IN_PLACE
+    else:
+        least = MIN_STEPS_SHARE
     if sum(timed) < least * known:
         return f"steps of a walk in {sum(timed):.1f} of {known:.1f} s"
     strides = _values(steps, "stride_seconds")

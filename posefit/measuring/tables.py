@@ -89,7 +89,10 @@ def write_trc(path: str | Path, motion: Motion, blank: Collection[int] = ()) -> 
     count = len(motion)
     numbers = motion.first + np.arange(count)
     unknown = np.isin(numbers, list(blank))
-    rows = np.arange(count) if unknown.all() else np.flatnonzero(~unknown)
+    if unknown.all():
+        rows = np.arange(count)
+    else:
+        rows = np.flatnonzero(~unknown)
     fps = f"{motion.fps:.10g}"
     head = {
         "DataRate": fps,

@@ -16,7 +16,7 @@
 | a motion of another program's skeleton, as one of posefit's | rig.py |
 | files for OpenSim, and for Blender and browsers | opensim.py, gltf.py |
 
-Files are checked in full. A mistake in one raises InputError, which names the file and
-the line, and says what was expected and what came. Files keep degrees and their own
+Files are checked in full. A mistake in one raises InputError with the file, the line,
+the expected and the actual text. Files keep degrees and their own
 length unit; in memory there are radians and metres.
 """

@@ -101,6 +101,7 @@ def read_amc(
         notes = (f"{path}: the file does not state its rate: {assumed}",)
     angles = values if radians else np.deg2rad(values)
     poses = np.zeros((len(values), ANGLES))
+    # the file turns the root about x, y, z; a pose has yaw, pitch and roll
     poses[:, :3] = root_angles_from_rotation(rotation_from_joint_angles(angles[:, 3:6]))
     poses[:, targets] = angles[:, columns]
     return Motion(
@@ -178,6 +179,7 @@ def _frames(lines: Iterator[Line], spans: Spans, frame: int, name: str) -> Array
             data.extend(row)
             if number is not None and number != frame + 1:
                 raise line.mistake(f"frame {frame + 1}", f"frame {number}")
+            # checked while reading, before a huge file fills the memory
             most = min(LONGEST * width, VALUES)
             if number is not None and len(data) >= most:
                 raise line.mistake(
@@ -196,7 +198,9 @@ def _frame_number(line: Line) -> int | None:
     if len(line.words) != 1 or len(word) >= 10:
         return None
     # isdigit alone also accepts digits that int() does not
-    return int(word) if word.isascii() and word.isdigit() else None
+    if word.isascii() and word.isdigit():
+        return int(word)
+    return None
 
 
 def _rate(line: Line, word: str) -> float:

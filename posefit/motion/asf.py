@@ -93,6 +93,7 @@ def parse_asf(path: str | Path, unit: Unit | None = None) -> Acclaim:
     )
     wanted = metres if unit is None else metres_of(unit)
     notes = list[str]()
+    # a file may state a unit that it does not use
     stature = Body.of(stated).stature
     if unit is None and not STATURES[0] <= stature <= STATURES[1]:
         guess = unit_of(stature / metres)
@@ -166,6 +167,7 @@ def _check_root(lines: list[Line]) -> None:
     for line in lines[1:]:
         if line.key in wanted and " ".join(line.words[1:]).upper() != wanted[line.key]:
             raise line.mistake(f"root {line.key} {wanted[line.key]}")
+        # a moved or turned root would change the meaning of every root channel
         if line.key in ("position", "orientation") and any(line.numbers(3)):
             raise line.mistake(f"root {line.key} 0 0 0")
     if all(line.key != "order" for line in lines):

@@ -138,6 +138,7 @@ def motion(
     poses = np.zeros((frames, ANGLES))
     poses[:, angles] = values[:, 3:]
     translations = values[:, :3].copy()
+    # centred on the origin, so that a camera around it sees the whole motion
     translations[:, 2] += pace * (times - 0.5 * times[-1])
     return Motion(name, average_skeleton(), poses, translations, fps)
 

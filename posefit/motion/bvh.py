@@ -159,6 +159,7 @@ def _upright(rig: Rig, up: Up | None) -> tuple[str, Array]:
         return up, np.array(TURNS[up], dtype=np.float64)
     number, cosine = upward(rig)
     name: Up = ("x", "y", "z")[number]
+    # a person who lies or crawls does not tell which axis is up
     if abs(cosine) < STANDING:
         return "y", np.eye(3)
     turn = np.array(TURNS[name], dtype=np.float64)
@@ -201,6 +202,7 @@ def _parsed(path: Path) -> tuple[list[_Node], Array, float]:
             data.extend(map(float, line.words))
         except ValueError:
             raise line.mistake(f"{width} numbers of frame {rows}") from None
+    # a file that was cut off would otherwise be a shorter motion
     if not rows or rows != count:
         raise line.mistake(f"{max(count, 1)} frames", f"{rows}")
     values = np.array(data).reshape(rows, width)
@@ -301,6 +303,7 @@ def _channels(line: Line) -> list[tuple[bool, int]]:
         if axis < 0 or kind not in ("position", "rotation"):
             raise line.mistake("channels such as Xposition or Zrotation")
         channels.append((kind == "rotation", axis))
+    # a wrong count would shift the columns of all joints that follow
     counted = line.words[1:2] == [str(len(channels))] and len(channels) <= 6
     if not counted or len(set(channels)) != len(channels):
         raise line.mistake("a number of at most 6 channels, and these channels")
@@ -320,6 +323,7 @@ def _rig(nodes: Sequence[_Node], values: Array) -> Rig:
         raise InputError(
             f"a person's joints, got a person without {cut(', '.join(joints), 200)}"
         )
+    # fingers and other details are not needed, and files have hundreds of them
     wanted: set[int] = set()  # the joints of the person, and all nodes above them
     for number in (
         joints.hips,
@@ -413,7 +417,10 @@ def write_bvh(path: str | Path, motion: Motion) -> None:
             where = motion.skeleton.offsets[above - 1]
         order.append(joint)
         lines.append(f"{tab}{'JOINT' if joint else 'ROOT'} {NAMES[JOINTS[joint]]}")
-        channels = "6 Xposition Yposition Zposition" if joint == 0 else "3"
+        if joint == 0:
+            channels = "6 Xposition Yposition Zposition"
+        else:
+            channels = "3"
         lines.extend(
             [
                 f"{tab}{{",

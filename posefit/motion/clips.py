@@ -86,7 +86,10 @@ def clip_of(source: Source, stated: FileOptions = RECOGNISED) -> SourceClip:
         )
     if recorded.is_recorded(source):
         return recorded_clip(recorded.clip(str(source)))
-    motion = source if isinstance(source, Motion) else _motion_in(source, stated)
+    if isinstance(source, Motion):
+        motion = source
+    else:
+        motion = _motion_in(source, stated)
     return SourceClip(motion.resampled, len(motion), motion.fps)
 
 
@@ -114,6 +117,7 @@ def _motion_in(source: str | Path, stated: FileOptions) -> Motion:
         )
     if path.suffix.lower() == ".bvh":
         return read_bvh(existing(path), unit=stated.unit, up=stated.up)
+    # a bare word may be a misspelt built-in motion, whose message lists the names
     if path.exists() or path.suffix or os.sep in str(source):
         expected = "an .amc file, a .bvh file or a built-in motion"
         raise InputError(
@@ -198,6 +202,8 @@ def training_clips(
         for clip in _clips(source, stated, followed):
             clips.append(clip)
             poses += clip.count(FPS)
+            # after each clip, so that a folder of too many is refused before all are
+            # read
             _check_memory(poses, FPS, most)
     return clips
 
@@ -261,7 +267,9 @@ def _stem(source: Source | None) -> str | None:
     """Return the name of a recorded clip, or of a file such as 16_15.amc."""
     if isinstance(source, Motion):
         return source.name
-    return None if source is None else Path(source).stem
+    if source is None:
+        return None
+    return Path(source).stem
 
 
 def _same(source: Source, other: Source | None) -> bool:

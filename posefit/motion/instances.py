@@ -99,6 +99,7 @@ class Variation:
 @lru_cache(maxsize=256)
 def variation(number: int) -> Variation:
     """Return how an instance differs from its motion: the same for every motion."""
+    # instance 0 is the motion itself, so that a plan without instances is unchanged
     if number == 0:
         return Variation(speed=1.0, phase=0.0, turn_degrees=0.0, start=0.0)
     rng = generator("motion", number)

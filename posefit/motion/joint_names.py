@@ -103,6 +103,7 @@ def part_of(name: str) -> Part:
                     word = word[len(side) :]
             rest.append(word)
     side = sides[-1] if sides else ""
+    # such as the `joint` of `left_hip_joint`, which says nothing
     while rest and rest[-1] in _ENDINGS:
         rest.pop()
     for others in range(len(rest)):
@@ -175,10 +176,12 @@ def joints_of(names: Sequence[str], parents: Sequence[int]) -> Joints | list[str
         return part.part != "head", part.others, len(paths[node])
 
     head = min(heads, key=unlikeness_to_head, default=None)
+    # the chest is the last joint before arms and head part
     above_chest = arms if head is None else [*arms, head]
     chest = _common(paths, above_chest)
     if hips is None or chest is None:
         return ["a root from which legs, arms and head go"]
+    # the legs would otherwise hang from the chest or from another person
     if hips not in paths[chest]:
         return [f"arms and head above the hips ({names[hips]!r})"]
     spine = paths[chest][paths[chest].index(hips) + 1 :]

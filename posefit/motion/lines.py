@@ -23,7 +23,9 @@ class Line(NamedTuple):
     @property
     def key(self) -> str:
         """The first word in lower case, "" after the last line."""
-        return self.words[0].lower() if self.words else ""
+        if self.words:
+            return self.words[0].lower()
+        return ""
 
     def mistake(self, expected: str, got: str | None = None) -> InputError:
         """Return the error of this line.
@@ -33,7 +35,10 @@ class Line(NamedTuple):
             got: the actual text, by default the whole line.
         """
         if got is None:
-            got = quoted_words(self.words) if self.words else "the end of the file"
+            if self.words:
+                got = quoted_words(self.words)
+            else:
+                got = "the end of the file"
         return InputError(
             f"{self.path}:{self.number}: expected {cut(expected, 2 * SHOWN)}, "
             f"got {cut(got)}"
@@ -76,6 +81,7 @@ def lines_of(path: Path, longest: int) -> Iterator[Line]:
                 )
             if words := raw.removeprefix(BOM).decode("utf-8", errors="replace").split():
                 yield Line(path, number, words)
+    # an empty line, so that a missing part of the file has a line number in its message
     yield Line(path, max(number, 1), ())
 
 

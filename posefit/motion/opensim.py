@@ -107,7 +107,10 @@ def write_osim(path: str | Path, body: Body, markers: Sequence[str]) -> None:
         )
         at = skeleton.offsets[start - 1] if start else np.zeros(3)
         turns = [f"{name}_{_TURNS[axis]}" for axis in JOINT_ORDER]
-        kind = "CustomJoint" if any(turn in free for turn in turns) else "WeldJoint"
+        if any(turn in free for turn in turns):
+            kind = "CustomJoint"
+        else:
+            kind = "WeldJoint"
         joint = _joint(
             joints, kind, name, f"/bodyset/{JOINTS[start]}", at, skeleton.axes[bone]
         )
@@ -131,12 +134,14 @@ def _inertia(offset: Array, radii: Array) -> tuple[float, Array, Array]:
     """
     length = float(np.linalg.norm(offset))
     first, last = radii
+    # the mean square of a radius that changes linearly
     square = float(first * first + first * last + last * last) / 3.0
     mass = max(DENSITY * np.pi * length * square, ROOT_KILOGRAMS)
     along = offset / max(length, 1e-9)
     across = mass * (3.0 * square + length * length) / 12.0
     about = 0.5 * mass * square
     line = np.outer(along, along)
+    # the last term: a bone without a length would have a singular inertia
     inertia = across * (np.eye(3) - line) + about * line + 1e-9 * np.eye(3)
     return mass, 0.5 * offset, inertia
 

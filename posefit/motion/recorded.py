@@ -199,7 +199,11 @@ def named(name: str) -> Sequence[RecordedClip]:
         InputError: a person is not in the library, or nobody is left.
     """
     _, colon, listed = name.partition(":")
-    people = [person.strip() for person in listed.split(",")] if colon else []
+    if colon:
+        people = [person.strip() for person in listed.split(",")]
+    else:
+        people = []
+    # a comma too many or a lone minus is a slip, not a choice of everybody
     if not is_library(name) or "" in people or "-" in people:
         raise InputError(
             f"a library must be {LIBRARY}, {LIBRARY}:02,16 or {LIBRARY}:-16, "

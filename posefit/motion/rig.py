@@ -227,6 +227,7 @@ def retargeted(rig: Rig, up: Array) -> Retargeted:
     average_leg = float(average.lengths[thigh_and_shin].sum())
     legs = [rig.length(side) for side in ("left", "right")]
     scale = float(np.mean(legs)) / average_leg
+    # also true of NaN
     if not scale > 0.0:
         raise InputError("legs with a length, got a length of 0")
     bones = _bones(rig, scale)
@@ -321,7 +322,10 @@ def _bones_at_rest(
         if length > 0.0:
             turn = shortest_turn(expected, vector)
             off = float(np.degrees(geodesic(np.eye(3), turn)))
-        tolerance = SAME_DIRECTION if name[1:] in _STEADY else AS_IN_FILE
+        if name[1:] in _STEADY:
+            tolerance = SAME_DIRECTION
+        else:
+            tolerance = AS_IN_FILE
         # a hip bone does not turn
         aligned = off > tolerance and not name.endswith("hipjoint")
         turned[joint] = before @ shortest_turn(expected, vector) if aligned else before

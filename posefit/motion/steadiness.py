@@ -55,6 +55,7 @@ def standing(joints: Array, fps: float) -> NDArray[np.bool_]:
     in_stance = (speed < MAX_STANDING_SPEED) & is_low
     for side in range(2):
         for start, stop in runs(in_stance[:, side]):
+            # a foot that swings past is slow for a frame or two
             in_stance[start:stop, side] &= stop - start >= MIN_STANDING_SECONDS * fps
     return np.asarray(in_stance)
 
@@ -96,6 +97,7 @@ def slides(joints: Array, in_stance: NDArray[np.bool_]) -> Array:
 
 def runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return the start and stop of each run of true flags (T,)."""
+    # so that a run at either end has two edges
     padded = np.concatenate([[False], flags, [False]]).astype(np.int8)
     edges = np.flatnonzero(np.diff(padded))
     return [(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]

@@ -129,7 +129,7 @@ def chosen_kinds(write: str | Sequence[str] = ()) -> tuple[str, ...]:
             have several, separated by commas. If empty, all kinds are chosen.
 
     Returns:
-        The kinds, always with `summary`.
+        The kinds, always with `summary`, and with `asf` if there is `amc`.
 
     Raises:
         InputError: A kind is unknown.
@@ -151,7 +151,11 @@ def chosen_kinds(write: str | Sequence[str] = ()) -> tuple[str, ...]:
             )
     if not kinds:
         return tuple(WRITERS)
-    return tuple(kind for kind in WRITERS if kind in kinds | {ALWAYS})
+    kinds.add(ALWAYS)
+    # no program can read an .amc file without the skeleton
+    if "amc" in kinds:
+        kinds.add("asf")
+    return tuple(kind for kind in WRITERS if kind in kinds)
 
 
 def write_files(

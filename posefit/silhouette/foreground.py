@@ -37,7 +37,15 @@ THRESHOLD = 25.0
 
 
 class Film(Protocol):
-    """A video at its working size, cut to the roi, for a segmenter to learn from."""
+    """A video at its working size, cut to the roi, for a segmenter to learn from.
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit.testing.segmenter_rules import painted
+        >>> film, _ = painted()
+        >>> np.median(list(film.frames(step=10)), axis=0).shape
+        (240, 320, 3)
+    """
 
     def __len__(self) -> int:
         """The number of frames."""
@@ -68,6 +76,19 @@ class Segmenter(Protocol):
       towards the camera, increasing to the image's right; NaN if there is nobody.
     - `landmarks` (27, 3), the column, row and confidence of the person's joints in the
       latest frame; the confidence is 0 to 1, and 0 for an unknown joint.
+
+    Example:
+        >>> import numpy as np
+        >>> class Dark:
+        ...     def __init__(self, film, *, limit: int = 60):
+        ...         self.limit = limit
+        ...
+        ...     def segment(self, image):
+        ...         person = image.max(axis=2) < self.limit
+        ...         return person, np.zeros_like(person)  # no shadow
+        >>> person, shadow = Dark(None).segment(np.full((2, 2, 3), 30, np.uint8))
+        >>> int(person.sum())
+        4
     """
 
     def segment(self, image: Image) -> tuple[Mask, Mask]:

@@ -186,7 +186,22 @@ class Silhouette:
 
 
 class Device(Protocol):
-    """Draws poses and counts their areas elsewhere than on the CPU."""
+    """Draws poses and counts their areas elsewhere than on the CPU.
+
+    Example:
+        >>> from dataclasses import replace
+        >>> from posefit.plugin import areas
+        >>> from posefit.testing.tracker_rules import scene
+        >>> class Twin:
+        ...     def areas(self, body, camera, silhouette, poses, translations):
+        ...         here = replace(silhouette, device=None)  # the CPU counts
+        ...         return areas(body, camera, here, poses, translations)
+        >>> task, walk, observations = scene()
+        >>> silhouette = observations[0].silhouettes[0]
+        >>> scenery = (task.body, task.cameras[0], silhouette)
+        >>> Twin().areas(*scenery, walk.poses[:1], walk.translations[:1]).shape
+        (1, 3)
+    """
 
     def areas(
         self,

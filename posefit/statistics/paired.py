@@ -96,6 +96,7 @@ def paired_tests(errors: ArrayLike) -> list[PairedTest]:
         p_values = np.maximum(_p_values(means, spreads, blocks), least_p)
     accumulated = _accumulated(p_values)
     adjusted = np.minimum(1.0, accumulated)
+    # no interval where so few blocks cannot show any difference
     reach = np.full(len(pairs), np.nan)
     if least_p * len(pairs) < SIGNIFICANCE:
         # Holm's method judges each difference at a different level, stricter than 5 %

@@ -94,6 +94,8 @@ def most_shared(
     every = _shared(runs, most_first) if most_first else None
     if every is not None and every.blocks.shape[1] >= MIN_SHARE * counts.max():
         return every
+    # the method with the most runs first, so that one with few runs cannot drive out
+    # others
     best: Shared | None = None
     accepted: list[int] = []
     for m in most_first:
@@ -115,6 +117,7 @@ def _shared(runs: Array, methods: list[int]) -> Shared | None:
     methods = sorted(methods)
     row, method, instance, seed = runs[:, np.isin(runs[1], methods)]
     seeds = seed.max() + 1
+    # one number for each pair of instance and seed
     names, block = np.unique(instance * seeds + seed, return_inverse=True)
     # the row of each method's run of each block, -1 if there is none
     table = np.full((len(methods), len(names)), -1)

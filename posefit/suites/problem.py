@@ -133,6 +133,7 @@ class SuiteCost:
         the problem is noisy, the result has the first of its masks.
         """
         self.looked = True
+        # the masks without noise would be more than the search gets
         frames = self.made.noisy[:1] or self.made.frames
         views_of_frames = []
         for frame in frames:
@@ -153,6 +154,7 @@ class SuiteCost:
         if self.infeasible == "reject":
             penalties[forbidden] = np.inf
         else:
+            # grows with the distance, so that a search can find its way back
             moved = np.linalg.norm(proposals - self.repaired(proposals), axis=1)
             penalties[forbidden] = PENALTY * moved[forbidden]
         return penalties
@@ -282,6 +284,7 @@ class Suite:
         return len(self._addresses)
 
     def __getitem__(self, index: int) -> Problem:
+        # a slice of problems would make them all at once
         if isinstance(index, slice):
             raise InputError(
                 f"index must be the number of one problem, got {quoted(index)}: "

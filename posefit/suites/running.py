@@ -99,6 +99,7 @@ def run_on(
         evaluations = problem.budget or EVALUATIONS * problem.dimension
     problem.budget = evaluations
     space = problem.space
+    # no two problems of a suite get the same random numbers
     rng = np.random.default_rng(
         [RNG_STREAM, seed, problem.id_function, problem.instance, problem.dimension]
     )
@@ -146,6 +147,7 @@ def run_of(
         >>> posefit.run_of(problem, "my search").method
         'my search'
     """
+    # with `infeasible="reject"` every proposal may have cost infinity
     if not len(problem.points):
         raise InputError(
             f"{problem.id}: {method} must propose something feasible, "
@@ -157,6 +159,7 @@ def run_of(
         raise InputError(
             f"{problem.id}: budget must be given, here or in the problem, got none"
         )
+    # a longer run would be compared with shorter ones
     if problem.evaluations > budget:
         raise InputError(
             f"{problem.id}: evaluations must be at most {budget}, the budget, "
@@ -285,7 +288,9 @@ def method_name(run: SuiteRun) -> str:
     details = [f"{name}={value}" for name, value in sorted(run.settings.items())]
     if run.looked:
         details.append("looks")
-    return f"{run.method} ({', '.join(details)})" if details else run.method
+    if details:
+        return f"{run.method} ({', '.join(details)})"
+    return run.method
 
 
 def _score(method: str, function: int, runs: Sequence[SuiteRun]) -> SuiteScore:
@@ -296,6 +301,7 @@ def _score(method: str, function: int, runs: Sequence[SuiteRun]) -> SuiteScore:
     used = np.array([run.evaluations[-1] for run in runs])
     times = expected_running_time(reached, used)
     running_times: dict[float, float | None] = {}
+    # the hardest function would decide a mean over all functions
     for above in () if function == ALL else SHOWN:
         time = times[int(np.flatnonzero(above == TARGETS)[0])]
         running_times[above] = float(time) if np.isfinite(time) else None

@@ -90,6 +90,17 @@ def check_tracker(
 
     Returns:
         The report. It is true if no check failed.
+
+    Example:
+        >>> from posefit.plugin import check_tracker
+        >>> class Lazy:
+        ...     def __init__(self, task):
+        ...         pass
+        ...
+        ...     def track(self, observations, rng):
+        ...         return iter(())  # yields no frame
+        >>> bool(check_tracker(Lazy))
+        False
     """
     return run_checks(factory, checks_of("tracker", factory, settings, looks_ahead))
 
@@ -103,6 +114,17 @@ def check_start(factory: Factory, *, settings: Settings = None) -> Report:
 
     Returns:
         The report. It is true if no check failed.
+
+    Example:
+        >>> from posefit.plugin import check_start
+        >>> class Blind:
+        ...     def __init__(self, task):
+        ...         pass
+        ...
+        ...     def posterior(self, observation):
+        ...         return None  # nothing is known
+        >>> [finding.rule for finding in check_start(Blind).of("failed")]
+        []
     """
     return run_checks(factory, checks_of("start", factory, settings))
 
@@ -116,6 +138,19 @@ def check_segmenter(factory: Factory, *, settings: Settings = None) -> Report:
 
     Returns:
         The report. It is true if no check failed.
+
+    Example:
+        >>> import numpy as np
+        >>> from posefit.plugin import check_segmenter
+        >>> class Nobody:
+        ...     def __init__(self, film):
+        ...         pass
+        ...
+        ...     def segment(self, image):
+        ...         empty = np.zeros(image.shape[:2], bool)
+        ...         return empty, empty
+        >>> bool(check_segmenter(Nobody))
+        False
     """
     return run_checks(factory, checks_of("segmenter", factory, settings))
 

@@ -80,6 +80,7 @@ def construction(case: PluginCase) -> None:
             f"the type of the setting {setting.name} must be {hints.KNOWN}, "
             f"got {setting.type}",
         )
+        # a default that its own type refuses would fail for every user
         if setting.default is not inspect.Parameter.empty:
             try:
                 hints.fitted(setting.annotation, setting.default)
@@ -161,6 +162,7 @@ def check_speed(what: str, limit: float, work: Callable[[int], int]) -> str:
         The time for an item, as text.
     """
     seconds = np.inf
+    # the fastest of three, because other processes may slow one down
     for turn in range(3):
         began = time.perf_counter()
         count = work(turn)

@@ -104,6 +104,7 @@ class Case(PluginCase):
                 f"got {len(proposals)}",
             )
             costs = np.asarray(evaluate(proposals), dtype=np.float64)
+            # copies, because an optimiser may write into its arrays
             yield proposals.copy(), costs.copy()
             optimiser.tell(proposals, costs)
 
@@ -292,6 +293,7 @@ def order(case: Case) -> str:
 
     good = [last(sphere, seed) for seed in range(3)]
     bad = [last(shuffled, seed) for seed in range(3)]
+    # equal bit for bit: the costs had no influence at all
     if good == bad:
         raise SkippedError("it ignores the costs, or has one proposal at a time")
     expect(
@@ -319,6 +321,7 @@ def seeds(case: Case) -> None:
 def new_process(case: Case) -> None:
     """The same seed gives the same proposals in a new process."""
     try:
+        # pickled twice, because the path has to be set before the plugin is imported
         payload = pickle.dumps((sys.path, pickle.dumps(case)))
     except Exception as error:
         raise SkippedError(

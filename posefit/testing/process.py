@@ -65,6 +65,8 @@ def check_in_process(
                 f"{kind} {name!r}: it must load in a separate process; {blame}"
             )
         done += [Result(**message) for message in messages if "outcome" in message]
+        # the process ended during this check: it failed, and the next ones get a new
+        # process
         if "outcome" not in messages[-1]:
             done.append(
                 Result(messages[-1].get("begins", plugin["checks"][0]), "failed", blame)
@@ -99,9 +101,13 @@ def _messages(task: dict[str, Any]) -> tuple[list[dict[str, Any]], str]:
         ended = time.monotonic()
         written.seek(0)
         messages = [json.loads(line) for line in written]
+    # a process that was ended by its own timer reports no reason
     if messages and ended - messages[-1].get("at", ended) > results.SECONDS:
         return messages, f"it must end within {results.SECONDS:g} s, and did not"
-    how = f"exit status {status}" if status >= 0 else signal.Signals(-status).name
+    if status >= 0:
+        how = f"exit status {status}"
+    else:
+        how = signal.Signals(-status).name
     return messages, f"it must not end the program, got {how}"
 
 
@@ -132,6 +138,8 @@ def _check() -> None:
     with memory(GIGABYTES):
         for check in checks:
             send(begins=check.name, at=time.monotonic())
+            # ends the process even in compiled code, which a Python signal cannot
+            # interrupt
             faulthandler.dump_traceback_later(
                 task["seconds"] + task["overrun"], exit=True
             )
@@ -164,7 +172,10 @@ def _checks(
         # check here: each check would report the same invalid value
         offer.factory(**settings)
     registered = {"optimiser": "next_frame", "tracker": "looks_ahead"}
-    more = [getattr(offer, registered[kind])] if kind in registered else []
+    if kind in registered:
+        more = [getattr(offer, registered[kind])]
+    else:
+        more = []
     checks = checks_of(kind, offer.factory, settings, *more)
     names = [check.name for check in checks]
     for rule in only:

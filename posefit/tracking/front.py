@@ -80,6 +80,11 @@ def track(
     Raises:
         InputError: There is a mistake in the arguments or files.
 
+    Example:
+        >>> import posefit
+        >>> track = posefit.track("walk", frames=(0, 3), evaluations=400)
+        >>> track.joints.shape
+        (3, 27, 3)
     """
     _check_names("track", options, [option.name for option in fields(TrackOptions)])
     chosen = TrackOptions(**options)
@@ -154,6 +159,11 @@ def fit(
     Returns:
         The pose and its track of one frame.
 
+    Example:
+        >>> import posefit
+        >>> fit = posefit.fit("walk", frame=10, evaluations=400)
+        >>> fit.pose.shape, fit.translation.shape
+        ((66,), (3,))
     """
     known = [option.name for option in fields(TrackOptions) if option.name != "frames"]
     _check_names("fit", options, [*_ARGUMENTS, *known])

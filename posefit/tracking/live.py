@@ -88,6 +88,21 @@ def track_live(
         InputError: If an option is invalid or needs all frames, or the stream breaks
             off.
 
+    Example:
+        >>> import io
+        >>> import sys
+        >>> import posefit
+        >>> from posefit.testing.tracker_rules import scene
+        >>> _, _, observations = scene()
+        >>> stream = b""
+        >>> for observation in observations:
+        ...     mask = observation.silhouettes[0].mask
+        ...     header = b"P5 %d %d 255 " % (mask.shape[1], mask.shape[0])
+        ...     stream += header + (255 * mask).astype("uint8").tobytes()
+        >>> sys.stdin = io.TextIOWrapper(io.BytesIO(stream))  # as from a pipe
+        >>> next(posefit.track_live("-", evaluations=200)).frame.pose.shape
+        (66,)
+        >>> sys.stdin = sys.__stdin__
     """
     chosen = TrackOptions(**options)
     for each in fields(chosen):

@@ -60,15 +60,16 @@ def _sources(name: str, value: Any) -> Sequence[Any]:
 class TrackOptions(SourceOptions):
     """The options of a track, checked.
 
-    For an option that is None or empty, the default depends on the source.
+    For an option that is None or empty, the default depends on the source. In Python
+    `method` may also be a tracker's class, or a pair: an optimiser, by name or class,
+    and a prior, by name or fitted.
     """
 
     method: "str | TrackerFactory | tuple[str | OptimiserFactory, str | Prior] | None" = option(  # noqa: E501
         None,
-        "OPTIMISER@PRIOR, OPTIMISER, @PRIOR or a tracker; see `posefit plugins`. "
-        "Default: exemplars, or annealed@pca for a built-in motion. In Python also a "
-        "tracker's factory, or a pair of an optimiser's name or factory and a prior's "
-        "name or a fitted prior.",
+        "OPTIMISER@PRIOR such as cma@pca, OPTIMISER, @PRIOR, or a tracker such as "
+        "vsmm; `posefit plugins` lists them. Default: exemplars, or annealed@pca for "
+        "a built-in motion.",
         _method,
         "METHOD",
         heading="Method and budget",

@@ -45,7 +45,10 @@ def joint_intervals(
         (3, 27)
     """
     model = posterior.recalibration or Recalibration()
-    spreads = model.place_spreads if world else model.joint_spreads
+    if world:
+        spreads = model.place_spreads
+    else:
+        spreads = model.joint_spreads
     offsets = skeleton.joints(posterior.poses) - skeleton.joints(pose)  # (K, 27, 3)
     distances = np.linalg.norm(offsets, axis=2)
     radii = quantiles(distances, posterior.weights, spreads, 3)

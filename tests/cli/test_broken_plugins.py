@@ -30,7 +30,7 @@ def posefit_register_optimisers(register):
 
 
 @each("source, cause", BROKEN.items())
-def test_a_broken_plugin_is_one_line(
+def test_a_broken_plugin_is_reported_in_one_line(
     source: str, cause: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "mine.py").write_text(source)

@@ -295,7 +295,7 @@ def test_a_folder_of_somebodys_own_files_is_never_replaced(tmp_path: Path) -> No
     )
 
 
-def test_a_mistake_is_one_line_and_status_2(tmp_path: Path) -> None:
+def test_a_mistake_is_reported_in_one_line_and_status_2(tmp_path: Path) -> None:
     for words, message in [
         (["wlak"], "did you mean 'walk'?"),
         (
@@ -622,7 +622,7 @@ def test_settings_are_given_by_plugin_and_name() -> None:
     assert settings["tracker"] == {"root_range_degrees": [30, 10, 10]}
 
 
-def test_a_setting_that_makes_no_sense_is_one_line() -> None:
+def test_a_setting_that_makes_no_sense_is_reported_in_one_line() -> None:
     for text, message in [
         (
             "sapso",
@@ -702,7 +702,7 @@ def test_a_mistake_is_a_traceback_for_who_debugs_and_a_fault_of_the_program_alwa
         (["plugins"], "posefit.cli.inspection.listing"),
     ],
 )
-def test_ctrl_c_while_a_command_runs_is_one_line_and_a_status(
+def test_ctrl_c_while_a_command_runs_is_reported_in_one_line_and_a_status(
     monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
     tmp_path: Path,
@@ -719,7 +719,9 @@ def test_ctrl_c_while_a_command_runs_is_one_line_and_a_status(
     assert "Aborted!" in capfd.readouterr().err.splitlines()
 
 
-def test_ctrl_c_while_posefit_is_imported_is_one_line_and_a_status() -> None:
+def test_ctrl_c_while_posefit_is_imported_is_reported_in_one_line_and_a_status() -> (
+    None
+):
     code = """
 import runpy, signal, sys
 class Interrupting:

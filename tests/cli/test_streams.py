@@ -51,7 +51,9 @@ def test_unreadable_messages_do_not_stop_the_work(tmp_path: Path) -> None:
 
 
 @each("unbuffered", ["", "1"])
-def test_results_that_cannot_be_written_are_one_line(unbuffered: str) -> None:
+def test_results_that_cannot_be_written_are_reported_in_one_line(
+    unbuffered: str,
+) -> None:
     line = "posefit: standard output: expected room to write results to, got No space left on device\n"
     for words in ("plugins --json", "--version", "--help"):
         ran = shell(f"posefit {words} >/dev/full", PYTHONUNBUFFERED=unbuffered)
@@ -72,7 +74,9 @@ def test_a_file_gets_messages_and_no_bars(tmp_path: Path) -> None:
         assert [part for part in ("\r", "it/s", "%|") if part in ran.stderr] == []
 
 
-def test_what_a_machine_refuses_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_error_of_the_machine_is_reported_in_one_line(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     fits = "expected work that fits .* GB of memory, got"
     denied = PermissionError(13, "Permission denied", "a.npz")
     for error, line in (

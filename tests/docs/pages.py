@@ -70,6 +70,14 @@ def blocks(page: Path) -> Iterator[Block]:
         )
 
 
+def sentences() -> Iterator[tuple[str, str]]:
+    """Yield the name of each page that was written by hand, with its text without blocks."""
+    for page in pages():
+        if page.suffix == ".md":
+            text = _MADE.sub("", page.read_text("utf-8"))
+            yield str(page.relative_to(ROOT)), _BLOCK.sub("", text)
+
+
 def _cells(page: Path) -> Iterator[Block]:
     """Yield the cells of a notebook that hold code, each with what it prints."""
     name = str(page.relative_to(ROOT))

@@ -28,7 +28,8 @@ TOOLS = (
 
 
 def commands(text: str) -> Iterator[list[str]]:
-    """Yield the words of every command of a block."""
+    """Yield the words of every command of a block, without the text of its input."""
+    text = re.sub(r"<<'?(\w+)'?\n.*?^\1$", "", text, flags=re.MULTILINE | re.DOTALL)
     words: list[str] = []
     for line in text.replace("\\\n", " ").splitlines():
         lexer = shlex.shlex(line, posix=True, punctuation_chars="&|;")
@@ -56,9 +57,12 @@ def check(words: list[str]) -> None:
         assert importlib.util.find_spec(words[2]) is not None, f"no module {words[2]}"
     elif name == "python":
         path = ROOT / words[1]
-        assert path.is_file(), f"no file {words[1]}"
+        assert path.exists(), f"no file {words[1]}"
+        study = None
         if path.parent.name == "studies":
-            command, _ = _innermost(import_module(path.stem).main, words[2:])
+            study = getattr(import_module(path.stem), "main", None)
+        if isinstance(study, click.Command):
+            command, _ = _innermost(study, words[2:])
             options = {
                 option for parameter in command.params for option in parameter.opts
             }

@@ -157,7 +157,7 @@ def test_the_films_of_each_layout(
         ),
     ],
 )
-def test_what_is_missing_is_one_line(
+def test_a_missing_file_is_reported_in_one_line(
     write: Write, spoilt: str, content: Any, words: str, tmp_path: Path
 ) -> None:
     film = write(tmp_path, walk(3))

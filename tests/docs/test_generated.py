@@ -140,7 +140,7 @@ def test_every_angle_is_described(tracked: Path) -> None:
     )
 
 
-def test_what_is_made_from_the_code_is_up_to_date() -> None:
+def test_generated_pages_are_up_to_date() -> None:
     # in a process of its own, because other tests register plugins, which --help names
     code = "import generator, json; print(json.dumps(generator.pages()))"
     made = subprocess.run(

@@ -49,7 +49,7 @@ def test_a_condition_is_motion_cameras_yaw_and_masks() -> None:
     assert related.condition_of(ROWS[0]) == ("walk", 1, True, True)
 
 
-def test_methods_stand_in_order_with_medians_of_parts() -> None:
+def test_methods_are_ordered_with_medians_of_parts() -> None:
     lines = [line.split(" | ") for line in related.methods(ROWS)][2:]
     assert [line[0].strip("| ") for line in lines] == [
         "`sapso@gplvm`",

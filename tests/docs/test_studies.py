@@ -139,7 +139,7 @@ def test_a_still_body_leaves_few_frames_and_a_moving_one_all() -> None:
     assert len(kept(np.linspace(0.0, 5.0, 50)[:, None] * [1.0, 0.0, 0.0])) == 8
 
 
-def test_clips_count_alike_and_the_one_to_come_as_infinitely_far() -> None:
+def test_clips_have_equal_weight_and_a_future_clip_is_infinitely_far() -> None:
     # three clips: 1, 2 | 3 | 4. Each weighs a quarter, shared by its scores; the last quarter is the new clip's
     scores = [np.array([2.0, 1.0]), np.array([3.0]), np.array([4.0])]
     # for a level of 0.6, of the three that are known alone 3 would be enough

@@ -67,7 +67,7 @@ def test_a_search_starts_from_the_proposals_of_a_policy() -> None:
     assert minimise(problem, search).best_cost < 2.0 * episode["best_cost"]
 
 
-def test_what_cannot_be_driven_is_named() -> None:
+def test_an_environment_that_cannot_be_driven_is_named() -> None:
     vector = gym.make_vec("posefit/FitImage-v1", num_envs=3)
     with pytest.raises(
         error.Error,
@@ -94,7 +94,7 @@ def tracking() -> Any:
     )
 
 
-def test_a_reference_is_what_a_step_reports_that_commits_and_nearer_than_the_middle_of_the_box(
+def test_a_reference_reports_what_a_committing_step_reports_and_beats_the_middle_of_the_box(
     tracking: Any,
 ) -> None:
     tracking.reset(seed=0)

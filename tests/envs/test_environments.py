@@ -148,7 +148,7 @@ class OnePopulation:
     def tell(self, proposals: Any, costs: Any) -> None: ...
 
 
-def test_track_proposals_mean_what_the_tracker_makes_of_them() -> None:
+def test_track_proposals_decode_as_in_the_tracker() -> None:
     env: Any = gym.make(
         "posefit/Track-v1", instance=5, frames=3, evaluations_per_frame=4
     ).unwrapped

@@ -68,7 +68,7 @@ def test_no_body_is_shown_twice() -> None:
     assert len(set(bodies)) == len(bodies)
 
 
-def test_no_silhouette_of_the_test_is_one_of_any_motions_training() -> None:
+def test_no_test_silhouette_occurs_in_any_training() -> None:
     trained = {one.tobytes() for kind in KINDS for one in silhouettes(kind, "train")}
     tested = {one.tobytes() for kind in KINDS for one in silhouettes(kind, "test")}
     assert trained.isdisjoint(tested)
@@ -99,7 +99,7 @@ def test_version_0_is_the_variant_that_shows_the_same_people(name: str) -> None:
     assert held_out.world == world_of()
 
 
-def test_of_a_single_person_nobody_is_held_out() -> None:
+def test_with_a_single_person_no_people_are_held_out() -> None:
     for motion in ("walk-a", "walk.bvh", ["walk", "run-a"]):
         with pytest.raises(
             ArgumentError, match="with held-out people, got .*: held_out_people=False"

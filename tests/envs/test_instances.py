@@ -58,7 +58,7 @@ def test_a_built_in_motion_and_its_views_are_the_same(number):
         assert azimuth(camera) == pytest.approx(azimuth(expected), abs=1e-9)
 
 
-def test_what_is_drawn_besides_changes_neither_the_motion_nor_the_cameras():
+def test_other_random_draws_change_neither_the_motion_nor_the_cameras():
     _, plain = both("walk", 17, 3)
     _, noisy = both(
         "walk",
@@ -129,7 +129,7 @@ def staged(
 
 
 @each("arguments", WORLDS)
-def test_scenes_together_are_what_the_library_computes_of_each_alone(
+def test_scenes_in_one_call_equal_the_library_scene_by_scene(
     arguments: dict[str, Any],
 ) -> None:
     stage, frames = staged((3, 17, 17, 9_000), **arguments)

@@ -84,7 +84,7 @@ def test_a_search_is_its_optimiser_by_ask_and_tell(
     assert info["evaluations"] == population_size * (4 + 6)
 
 
-def test_an_optimiser_with_populations_of_its_own_is_named() -> None:
+def test_an_optimiser_with_another_population_size_is_named() -> None:
     with pytest.raises(
         error.Error,
         match="optimiser must propose 8 poses at a time, got .* of 'annealed'",
@@ -92,9 +92,7 @@ def test_an_optimiser_with_populations_of_its_own_is_named() -> None:
         made(optimiser="annealed").reset(seed=0)
 
 
-def test_the_bests_of_all_particles_are_feasible_and_the_best_is_what_it_costs() -> (
-    None
-):
+def test_personal_bests_are_feasible_and_have_their_costs() -> None:
     env = made(generations=(60, 60))
     env.reset(seed=1)
     env.action_space.seed(1)

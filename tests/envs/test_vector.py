@@ -158,7 +158,7 @@ def test_a_vector_environment_equals_single_ones(
 
 @each("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
 @each(("name", "limit"), [(name, limit) for name in CASES for limit in (3, 7)])
-def test_ends_and_time_limits_reset_it_as_gymnasiums_own(
+def test_ends_and_time_limits_reset_it_as_in_gymnasium(
     name: str, limit: int, mode: AutoresetMode
 ) -> None:
     assert resets_as_gymnasiums(name, mode, limit, CASES[name][-1] | SHORT[name]) > 3
@@ -212,7 +212,9 @@ def test_a_reset_gives_each_environment_its_instance(name: str) -> None:
         np.zeros(3, dtype=bool),
     ],
 )
-def test_a_wrong_reset_mask_raises_what_gymnasiums_own_vectors_raise(mask: Any) -> None:
+def test_a_wrong_reset_mask_raises_the_same_error_as_gymnasiums_vectors(
+    mask: Any,
+) -> None:
     name = "posefit/FitImage-v1"
     raised = []
     for vector in (gym.make_vec(name, 3), gym.make_vec(name, 3, "sync")):

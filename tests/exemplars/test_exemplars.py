@@ -30,7 +30,7 @@ def test_similar_frames_are_kept_once_and_ends_of_clips_always() -> None:
     assert frames_apart(codes[:2], np.float32(1.0)).tolist() == [0, 1]
 
 
-def test_nearest_codes_are_those_of_all_in_the_groups_looked_at() -> None:
+def test_nearest_codes_equal_a_search_of_all_codes_in_the_groups() -> None:
     rng = np.random.default_rng(0)
     codes = rng.normal(size=(200, DIMENSIONS)).astype(np.float32)
     # one group is small, and one empty
@@ -51,7 +51,7 @@ def test_nearest_codes_are_those_of_all_in_the_groups_looked_at() -> None:
 
 
 @each("backwards", [False, True])
-def test_a_pose_goes_on_as_its_clip_and_stops_at_its_end(
+def test_a_pose_continues_with_its_clip_and_stops_at_the_clips_end(
     two: Exemplars, backwards: bool
 ) -> None:
     walk = built_in.motion("walk-a", frames=40)

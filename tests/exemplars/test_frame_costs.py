@@ -32,9 +32,7 @@ def recalibration(cost: float, usable: bool = True) -> Recalibration:
     return recalibrated(samples, np.zeros(66), cost, frame_costs).recalibration
 
 
-def test_errors_are_expected_to_grow_with_the_cost_up_to_the_greatest_where_nothing_is_visible() -> (
-    None
-):
+def test_expected_errors_grow_with_the_cost_and_are_largest_for_hidden_joints() -> None:
     good = recalibration(2.0)
     bad = recalibration(20.0)
     assert (bad.joint_spreads[1:] > good.joint_spreads[1:]).all()
@@ -48,7 +46,7 @@ def test_errors_are_expected_to_grow_with_the_cost_up_to_the_greatest_where_noth
 
 
 @each("views", [(45.0,), (45.0, 135.0)])
-def test_mirror_costs_are_those_of_the_mirrored_and_each_reflected_pose(
+def test_mirror_costs_are_the_costs_of_the_mirrored_and_reflected_poses(
     views: tuple[float, ...],
 ) -> None:
     walk = walk_of(built_in.motion("walk-a", frames=1), views)

@@ -93,7 +93,7 @@ def test_cameras_that_show_nothing_do_not_count_and_more_than_four_count_as_four
     assert evidence == [(1.0, True), (2.0, False), (4.0, False), (4.0, False)]
 
 
-def test_the_motion_of_a_root_is_its_speed_and_that_where_it_faces() -> None:
+def test_the_roots_motion_is_its_speed_and_the_speed_along_its_heading() -> None:
     places = [
         np.array([0.0, 0.9, 0.0]),
         np.array([0.01, 0.9, 0.03]),

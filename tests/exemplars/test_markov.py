@@ -86,9 +86,7 @@ def test_means_of_yaws_go_the_short_way_round() -> None:
     ) == pytest.approx(-1.0)
 
 
-def test_estimates_are_unchanged_where_nothing_is_smoothed_and_a_known_root_always() -> (
-    None
-):
+def test_estimates_stay_unchanged_without_smoothing_and_with_a_known_root() -> None:
     rng = np.random.default_rng(0)
     rough = [
         estimate(rng.normal(size=66), rng.normal(size=3), np.zeros(3)) for _ in range(6)

@@ -13,7 +13,9 @@ from tests.cases import each
 
 @each("ties", [False, True])
 @each("sizes", [(1, 5), (2, 6), (2, 7), (9, 10), (9, 40), (28, 13), (28, 40)])
-def test_both_learn_the_same_until_they_end(ties: bool, sizes: tuple[int, int]) -> None:
+def test_both_searches_learn_the_same_to_the_end(
+    ties: bool, sizes: tuple[int, int]
+) -> None:
     d, population = sizes
     rng = np.random.default_rng(d)
     mean = rng.normal(0.0, 0.1, d)
@@ -42,7 +44,7 @@ def test_both_learn_the_same_until_they_end(ties: bool, sizes: tuple[int, int]) 
     assert d > 2
 
 
-def test_what_leaves_the_box_is_drawn_again_before_it_is_moved_to_its_side() -> None:
+def test_points_outside_the_box_are_redrawn_before_they_are_moved_to_its_side() -> None:
     # a tenth of a standard deviation from the side 46.02 % of all draws are beyond it: 54 % of enough are not
     space = Toy(
         2, start=Start(np.array([0.99, 0.0]), np.array([0.1, 0.01]), np.zeros(2))
@@ -82,7 +84,7 @@ def test_a_spread_of_nothing_is_refused() -> None:
         space = Toy(4, start=Start(np.zeros(4), spread, np.zeros(4)))
         with pytest.raises(
             InputError,
-            match="spread must be above 0 in some coordinate and negative in none, got",
+            match="spread must be 0 or more in each coordinate, and above 0 in one, got",
         ):
             CMAES(space, np.random.default_rng(0))
     narrow = Toy(
@@ -91,7 +93,7 @@ def test_a_spread_of_nothing_is_refused() -> None:
     assert np.abs(CMAES(narrow, np.random.default_rng(0)).ask()[:, 1]).max() < 1e-5
 
 
-def test_what_is_moved_is_moved_towards_the_best_of_the_last_generation() -> None:
+def test_infeasible_points_are_moved_towards_the_best_of_the_last_generation() -> None:
     optimiser = CMAES(Toy(3, shell), np.random.default_rng(0), population_size=10)
     for seed in range(3):
         proposals = optimiser.ask()
@@ -129,7 +131,7 @@ def test_a_best_in_a_corner_or_beyond_the_box_is_reached(dimensions: int) -> Non
         assert max(gaps) < 1e-3, (cost, gaps)
 
 
-def test_what_is_drawn_beyond_the_box_is_learned_where_it_was_drawn() -> None:
+def test_points_drawn_outside_the_box_are_learned_where_they_were_drawn() -> None:
     # in a corner of nine sides one draw of 2^9 is inside: nearly all of these are moved
     start = Start(np.full(9, 1.0), np.full(9, 0.1), np.zeros(9))
     optimiser = CMAES(Toy(9, start=start), np.random.default_rng(0), population_size=40)

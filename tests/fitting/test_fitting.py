@@ -59,7 +59,7 @@ def drawn(cost: SilhouetteCost, count: int) -> Array:
     ("translation", "tilted"),
     [("known", False), ("searched", True), ("aligned", False)],
 )
-def test_a_cost_has_the_same_bits_whatever_is_beside_it(
+def test_a_cost_has_the_same_bits_in_any_population(
     cost: SilhouetteCost, translation: str, tilted: bool
 ) -> None:
     tilt = (
@@ -254,7 +254,7 @@ def test_mistakes_are_named(cost: SilhouetteCost) -> None:
         ),
         (
             lambda: replace(cost, silhouettes=[]),
-            r"silhouettes must be one a camera \(2\), got 0",
+            r"silhouettes must be one for each camera \(2\), got 0",
         ),
         (
             lambda: replace(cost, silhouettes=[empty] * 2),

@@ -101,7 +101,7 @@ def test_exchanged_landmarks_are_expected_to_stay_so() -> None:
     np.testing.assert_allclose(twice, -np.log(total).sum(axis=1), rtol=1e-9)
 
 
-def test_the_odds_of_sides_are_at_most_those_of_the_usual_shares() -> None:
+def test_the_odds_of_sides_are_bounded_by_the_usual_shares() -> None:
     usual = EXCHANGED[[LEGS, ARMS]]
     most = np.log((1.0 - usual) / usual)
     landmarks = landmarks_of(1.0)
@@ -115,7 +115,7 @@ def test_the_odds_of_sides_are_at_most_those_of_the_usual_shares() -> None:
     assert not side_odds(likelihoods(landmarks_of(0.0), WALK.poses[3:4])[0]).any()
 
 
-def test_legs_have_odds_of_their_own_and_views_add_up() -> None:
+def test_legs_have_separate_odds_and_views_add_up() -> None:
     landmarks = landmarks_of(1.0)
     legs = GROUPS[LEGS]
     landmarks[0, legs] = landmarks[0, MIRRORED[legs]]  # the legs alone are exchanged

@@ -125,7 +125,7 @@ def test_an_estimate_in_one_point_is_at_the_centroid_for_pa_mpjpe() -> None:
 
 
 @given(seeds, rotations)
-def test_where_the_pair_stands_and_faces_does_not_decide_a_swap(
+def test_a_swap_does_not_depend_on_position_or_heading(
     joints: Array, seed: int, rotation: Array
 ) -> None:
     rng = np.random.default_rng(seed)

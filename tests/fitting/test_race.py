@@ -50,7 +50,7 @@ def test_the_best_starts_are_searched_longer_whatever_their_weight() -> None:
     assert np.abs(cheapest(searches[0]).best).max() < 0.1
 
 
-def test_what_is_hardly_likely_is_not_searched() -> None:
+def test_unlikely_modes_are_not_searched() -> None:
     searches = race(starts((1.0, 0.9 * MIN_WEIGHT, 0.0, 0.0)), search, 1000)
     assert len(searches) == 1
     assert searches[0][0].evaluations == 1000

@@ -86,7 +86,7 @@ def test_a_mode_is_around_its_pose_that_costs_least() -> None:
     )
 
 
-def test_nothing_is_guessed_where_the_pose_is_known_or_nothing_shows() -> None:
+def test_nothing_is_guessed_for_a_known_pose_or_an_empty_mask() -> None:
     body = posefit.Body.of(WALK.skeleton)
     camera = posefit.Camera.framing(WALK.joints[0], body.joint_radii(), 0.0, (64, 48))
     observation = Observation([posefit.Silhouette.of(np.ones((48, 64)))])

@@ -161,7 +161,7 @@ def test_a_camera_whose_unit_is_known_keeps_it_beside_one_whose_unit_is_open(
 
 
 @pytest.mark.parametrize("program", OF_ONE_UNIT)
-def test_a_file_whose_program_writes_one_unit_needs_none(
+def test_a_file_of_a_program_with_one_unit_needs_no_unit(
     tmp_path: Path, program: str
 ) -> None:
     write, suffix, _ = programs.SAMPLES[program]
@@ -360,7 +360,7 @@ def test_names_that_fit_two_orders_are_refused() -> None:
         order_by_name([_named("a"), _named("b")], ["b/a.npz", "a/b.npz"])
 
 
-def test_the_order_of_a_calibration_file_does_not_matter_where_names_tell(
+def test_names_decide_before_the_order_of_a_calibration_file(
     tmp_path: Path,
 ) -> None:
     path = calibration(tmp_path / "two.toml", 1.0)

@@ -89,7 +89,7 @@ def test_a_video_of_masks_is_taken_as_it_is(tmp_path: Path) -> None:
     assert stored["valid"].all()
 
 
-def test_what_is_extracted_can_be_tracked_and_unknown_pixels_stay_unknown(
+def test_extracted_masks_can_be_tracked_and_unknown_pixels_stay_unknown(
     filmed: Film, tmp_path: Path
 ) -> None:
     path, _ = filmed
@@ -492,7 +492,7 @@ def test_pictures_are_extracted_masks_cleaned_and_motions_drawn(
         extract(tmp_path / "masks", tmp_path / "new", Extraction("median"))
 
 
-def test_what_several_cameras_took_is_extracted_to_a_folder_each(
+def test_views_of_several_cameras_are_extracted_to_a_folder_each(
     filmed: Film, tmp_path: Path
 ) -> None:
     files = [

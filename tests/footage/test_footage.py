@@ -182,7 +182,7 @@ def test_lens_distortion_is_undone_and_what_the_lens_missed_is_unknown(
     assert not silhouette.valid.all()
 
 
-def test_a_track_goes_on_where_it_ended(tmp_path: Path) -> None:
+def test_a_resumed_track_continues_at_its_last_frame(tmp_path: Path) -> None:
     path = stack(tmp_path / "a.npz", truth()[10:30], usable=np.arange(20) != 11)
     settings: dict[str, Any] = {
         "evaluations": 400,
@@ -221,7 +221,7 @@ def test_a_track_goes_on_where_it_ended(tmp_path: Path) -> None:
     np.testing.assert_array_equal(again.motion.translations, whole.motion.translations)
 
 
-def test_what_cannot_be_resumed_is_reported(tmp_path: Path) -> None:
+def test_a_track_that_cannot_be_resumed_is_reported(tmp_path: Path) -> None:
     with pytest.raises(
         ValueError, match="expected an interrupted track to resume, got none"
     ):
@@ -231,7 +231,7 @@ def test_what_cannot_be_resumed_is_reported(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_full_disk_is_one_line_and_loses_no_frame(tmp_path: Path) -> None:
+def test_a_full_disk_is_reported_in_one_line_and_loses_no_frame(tmp_path: Path) -> None:
     words = [
         "track",
         str(stack(tmp_path / "a.npz", truth()[10:30])),
@@ -391,7 +391,7 @@ def test_a_mistake_with_footage_leaves_one_line(
         ("missing.trc", None, "expected a file, got nothing of that name"),
     ],
 )
-def test_a_file_of_no_source_is_called_what_it_is(
+def test_a_file_that_is_no_source_is_named_by_its_type(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     name: str,

@@ -333,7 +333,7 @@ def test_a_frame_that_the_edge_leaves_little_of_is_not_usable(tmp_path: Path) ->
     assert read_.usable.all()
 
 
-def test_of_several_people_the_nearest_to_the_last_one_is_followed(
+def test_the_person_nearest_to_the_last_position_is_followed(
     tmp_path: Path,
 ) -> None:
     walker = [(40 + 4 * k, 60) for k in range(25)]
@@ -365,7 +365,7 @@ def test_of_several_people_the_nearest_to_the_last_one_is_followed(
         (("170,60",), (180, 60)),
     ],
 )
-def test_who_is_in_the_film_longest_is_followed_or_who_is_chosen(
+def test_the_longest_visible_or_the_chosen_person_is_followed(
     words: Sequence[str], followed: tuple[int, int], tmp_path: Path
 ) -> None:
     masks = [blob((40, 60), tall=64) | blob((180, 60))] * 3 + [blob((180, 60))] * 2
@@ -378,7 +378,7 @@ def test_who_is_in_the_film_longest_is_followed_or_who_is_chosen(
     assert clean.usable.tolist() == [True] * 3 + [followed[0] == 180] * 2
 
 
-def test_nobody_of_a_number_is_one_line(tmp_path: Path) -> None:
+def test_an_unknown_person_number_is_reported_in_one_line(tmp_path: Path) -> None:
     masks = [blob((40, 60)) | blob((180, 60))] * 4
     path = stack(tmp_path / "a.npz", masks)
     error = error_of("track", path, "--person", "3", *QUICK)
@@ -663,7 +663,7 @@ def test_a_translucent_colour_is_the_person(
 
 @each("kind", [np.uint8, np.uint16, np.int32])
 @each("count", [20, 70, 200])
-def test_labels_are_asked_for_however_many_there_are(
+def test_a_label_is_required_for_any_number_of_labels(
     walk: list[Any], tmp_path: Path, kind: Any, count: int
 ) -> None:
     images = []

@@ -55,7 +55,7 @@ def crossing(seed: int) -> Iterator[tuple[Any, list[Any], Any]]:
 
 
 @each("asked", [False, True])
-def test_specks_near_nobody_are_no_person(asked: bool) -> None:
+def test_specks_are_not_a_person(asked: bool) -> None:
     mask = np.zeros((240, 320), dtype=bool)
     mask[60:180, 20:45] = True  # 3,000 pixels
     for k in range(28):  # 3,640 in all, each too small to be a part of a person
@@ -67,7 +67,9 @@ def test_specks_near_nobody_are_no_person(asked: bool) -> None:
 
 
 @each("seed", range(10))
-def test_of_two_who_cross_one_is_followed_and_the_other_is_unknown(seed: int) -> None:
+def test_of_two_people_who_cross_one_is_followed_and_the_others_pixels_are_unknown(
+    seed: int,
+) -> None:
     people = People(30.0)
     true = []
     for image, shown, together in crossing(seed):
@@ -147,7 +149,7 @@ class Prefers(GoesOver):
 
 @each("factory", [GoesOver, Prefers])
 @pytest.mark.parametrize(("person", "followed"), [(1, 0), (2, 1), (None, None)])
-def test_a_segmenter_of_one_person_is_used_where_it_shows_the_one_who_is_followed(
+def test_a_segmenter_of_one_person_is_used_if_it_shows_the_chosen_person(
     tmp_path: Path,
     segmenter: Callable[..., None],
     factory: Any,
@@ -181,9 +183,7 @@ def test_a_segmenter_of_one_person_is_used_where_it_shows_the_one_who_is_followe
     assert np.median(shares[given, followed]) > 0.8
 
 
-def test_the_person_of_a_mask_is_whom_it_covers_or_else_that_of_the_mask_before() -> (
-    None
-):
+def test_the_person_of_a_mask_is_the_one_it_covers_or_else_the_previous_one() -> None:
     people = People(30.0)
     sides = np.zeros((3, *SIZE[::-1]), dtype=bool)
     sides[0, 20:100, 20:50] = sides[1, 30:100, 115:145] = sides[2, 20:100, 70:90] = True

@@ -51,7 +51,7 @@ def test_pages_of_a_file_are_frames(walk: list[Any], tmp_path: Path, name: str) 
 
 
 @each("suffix", [".tif", ".gif"])
-def test_several_files_of_pages_are_what_several_cameras_took(
+def test_several_files_of_pages_belong_to_several_cameras(
     walk: list[Any], tmp_path: Path, suffix: str
 ) -> None:
     first, *others = drawn(walk)
@@ -87,9 +87,7 @@ def test_an_animated_png_is_refused(walk: list[Any], tmp_path: Path) -> None:
             read_masks(tmp_path, ALL)
 
 
-def test_numbers_that_are_missing_are_frames_in_which_nothing_is_known(
-    walk: list[Any], tmp_path: Path
-) -> None:
+def test_missing_numbers_are_unknown_frames(walk: list[Any], tmp_path: Path) -> None:
     for number, image in zip((7, 8, 10, 11, 14, 15), drawn(walk), strict=True):
         image.save(tmp_path / f"mask_{number}.png")
     masks = read_masks(tmp_path, ALL)
@@ -151,7 +149,7 @@ def test_numbers_that_are_missing_are_frames_in_which_nothing_is_known(
         (["only9.png"], 1, None),
     ],
 )
-def test_what_numbers_in_names_mean_is_reported(
+def test_the_meaning_of_numbers_in_names_is_reported(
     names: list[str], count: int, guess: str | None
 ) -> None:
     frames, guesses, *_ = numbered([Path(name) for name in names], "masks")

@@ -88,7 +88,7 @@ def test_a_person_who_is_always_there_is_refused_before_any_tracking(
         ("jumping", 2, "empty", None),
     ],
 )
-def test_where_a_network_is_installed_the_segmenter_that_is_not_doubted_takes_the_person_out(
+def test_if_a_network_is_installed_the_segmenter_without_doubts_is_used(
     films: dict[str, Any],
     kind: Kind,
     cameras: int,
@@ -137,7 +137,7 @@ def test_where_a_network_is_installed_the_segmenter_that_is_not_doubted_takes_th
 
 
 @each("kind", ["passing", "leaving", *ALWAYS])
-def test_with_an_empty_picture_the_person_is_segmented_whatever_they_do(
+def test_with_an_empty_picture_the_person_is_segmented_in_any_motion(
     films: dict[str, Any], kind: Kind
 ) -> None:
     path, true = films[kind]
@@ -172,9 +172,7 @@ def test_mediapipe_needs_no_background(films: dict[str, Any], kind: Kind) -> Non
 
 @pytest.mark.slow
 @pytest.mark.skipif(not DEMO.is_file(), reason=f"no video at {DEMO}")
-def test_of_two_real_people_the_one_who_passes_is_good_and_the_one_on_the_spot_is_refused() -> (
-    None
-):
+def test_a_person_who_walks_through_is_good_and_one_on_the_spot_is_refused() -> None:
     walker = ((0, 420, 1520, 532), (55, 166))
     jumper = ((380, 0, 600, 450), (0, 160))
     segmentation, masks = segmented(DEMO, Extraction(roi=walker[0]), walker[1])
@@ -222,7 +220,7 @@ def of(mask: Any) -> Person:
     return Person(mask, np.ones_like(mask), int(mask.sum()), 1, 0.0, False)
 
 
-def test_a_mask_beside_which_most_of_what_moves_lies_is_not_usable() -> None:
+def test_a_mask_is_not_usable_if_most_motion_is_outside_it() -> None:
     def arm(mask: Any) -> Any:
         part = mask.copy()
         part[45:] = False
@@ -271,7 +269,7 @@ def test_before_a_camera_that_pans_masks_that_need_no_still_background_are_usabl
         assert any("outside" in text for text in segmentation.warnings) == still
 
 
-def test_what_has_no_persons_shape_is_not_usable() -> None:
+def test_a_mask_without_a_persons_shape_is_not_usable() -> None:
     for tall, wide in [(10, 4), (60, 2), (40, 40)]:
         image, mask = figure(0, tall, wide)
         assert FrameQuality(30.0).row(image, of(mask), 0)["usable"] == 0
@@ -453,12 +451,12 @@ def degrees(facings: list[float], camera: Camera = FRONT) -> list[float]:
     ]
 
 
-def test_a_facing_is_turned_by_where_the_camera_stands() -> None:
+def test_a_heading_is_converted_from_the_camera_to_the_world() -> None:
     assert degrees([10.0] * 3) == [10.0] * 3
     assert degrees([10.0] * 3, LEFT) == [100.0] * 3
 
 
-def test_a_wrong_picture_does_not_count_and_a_turn_past_180_degrees_goes_on() -> None:
+def test_a_wrong_picture_does_not_count_and_a_turn_continues_past_180_degrees() -> None:
     assert degrees([20.0] * 4 + [-160.0] + [20.0] * 4) == [20.0] * 9
     assert degrees([170.0, -170.0, 170.0, -170.0])[0] == pytest.approx(176.6, abs=0.1)
 
@@ -602,7 +600,7 @@ def test_only_masks_without_the_person_have_another_way_tried(
         (100, 80, 30 * 30, 22 * 22),
     ],
 )
-def test_what_moves_is_counted_around_the_person_and_at_the_body(
+def test_moving_pixels_are_counted_around_the_person_and_on_the_body(
     left: int, top: int, around: int, at: int
 ) -> None:
     region = np.zeros((100, 120), dtype=bool)

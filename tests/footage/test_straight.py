@@ -163,7 +163,7 @@ def test_pal_dv_and_a_bent_lens_become_square_at_once(tmp_path: Path) -> None:
     assert not silhouette.valid.all()
 
 
-def test_landmarks_and_pictures_are_those_of_square_pixels(tmp_path: Path) -> None:
+def test_landmarks_and_pictures_have_square_pixels(tmp_path: Path) -> None:
     camera, masks = squeezed(usual(), 2, 1)
     motion = walk()
     points = motion.joints[AT[0]]
@@ -226,7 +226,7 @@ def test_a_known_motion_is_drawn_with_square_pixels(tmp_path: Path) -> None:
         ),
     ],
 )  # fmt: skip
-def test_pictures_of_another_size_are_scaled_or_cropped_and_that_is_said(
+def test_pictures_of_another_size_are_scaled_or_cropped_with_a_note(
     tmp_path: Path, stated: tuple[int, int], said: list[str]
 ) -> None:
     camera = usual()
@@ -258,7 +258,9 @@ def test_pictures_of_another_shape_are_refused(tmp_path: Path) -> None:
         scene_of([path], SourceOptions(camera=[toml(tmp_path / "one.toml", made)]))
 
 
-def test_what_is_written_of_squeezed_masks_has_their_camera(tmp_path: Path) -> None:
+def test_files_of_stretched_masks_have_the_cameras_square_pixels(
+    tmp_path: Path,
+) -> None:
     import posefit
     from posefit.progress import QUIET
 

@@ -22,7 +22,7 @@ def test_people_of_the_library_are_all_their_clips_at_any_rate() -> None:
     assert len(clips[0].motion(15.0)) == (len(whole) + 1) // 2
 
 
-def test_mistakes_are_one_line() -> None:
+def test_mistakes_are_reported_in_one_line() -> None:
     for words, message in [
         (
             ["--without-subject", "16"],
@@ -108,7 +108,9 @@ def test_more_than_the_memory_holds_is_refused_before_a_motion_is_made(
     )
 
 
-def test_a_folder_with_a_clip_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
+def test_a_folder_with_a_clip_that_cannot_be_read_is_reported_in_one_line(
+    tmp_path: Path,
+) -> None:
     path = tmp_path / "a.bvh"
     words = ("track", "walk", "--train", tmp_path, "--out", tmp_path / "out")
     path.mkdir()

@@ -187,7 +187,7 @@ def test_a_picture_that_is_missing_is_held(filmed: Film, tmp_path: Path) -> None
         (12.3, 60.0, 12.3),
     ],
 )
-def test_the_stated_rate_is_kept_where_the_times_allow_it(
+def test_the_stated_rate_is_kept_if_it_agrees_with_the_times(
     rate: float, stated: float, expected: float
 ) -> None:
     for seconds in (20, 200):

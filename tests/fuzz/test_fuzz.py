@@ -36,7 +36,7 @@ def test_an_input_is_the_same_for_the_same_seed_and_number():
     )
 
 
-def test_the_harness_tells_what_is_neither_read_nor_refused(tmp_path):
+def test_the_harness_reports_files_that_are_neither_read_nor_refused(tmp_path):
     path = tmp_path / "subject.toml"
 
     def raising(error):

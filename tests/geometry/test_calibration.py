@@ -661,7 +661,7 @@ def test_a_list_of_cameras_is_read(tmp_path: Path) -> None:
         ("<calibration><cameras/></calibration>", "XML of 'calibration', which"),
     ],
 )
-def test_xml_of_another_program_is_called_that(
+def test_xml_of_another_program_is_reported_as_such(
     tmp_path: Path, text: str, what: str
 ) -> None:
     for name in ("a.xml", "a.xcp"):

@@ -58,7 +58,9 @@ def test_every_dialect_has_a_sample_here_or_in_the_other_tests(tmp_path: Path) -
 
 
 @each("program", list(SAMPLES))
-def test_a_known_point_is_where_it_is_by_hand(tmp_path: Path, program: str) -> None:
+def test_a_known_point_has_the_position_worked_out_by_hand(
+    tmp_path: Path, program: str
+) -> None:
     write, suffix, metres = SAMPLES[program]
     one = one_of(tmp_path, write(), suffix)
     assert one.name == "left"
@@ -105,7 +107,7 @@ def test_a_known_point_is_where_it_is_by_hand(tmp_path: Path, program: str) -> N
         ("OpenCV", {"pitch_deg": 8.0, "rvec": None, "tvec": None}, "pitch_deg"),
     ],
 )  # fmt: skip
-def test_what_a_program_is_not_known_to_write_is_refused_by_its_name(
+def test_a_key_that_a_program_does_not_write_is_refused_by_name(
     tmp_path: Path, program: str, more: dict[str, Any], key: str
 ) -> None:
     write, suffix, _ = SAMPLES[program]
@@ -277,7 +279,7 @@ def test_transforms_may_state_angles_and_no_centre(
     )
 
 
-def test_frames_have_lenses_and_names_of_their_own(tmp_path: Path) -> None:
+def test_each_frame_may_have_its_own_lens_and_name(tmp_path: Path) -> None:
     matrix = [[450.0, 0.0, 300.0], [0.0, 450.0, 230.0], [0.0, 0.0, 1.0]]
     frames = [
         {"file_path": f"{folder}/0001.png", "transform_matrix": programs.GL_TO_WORLD}
@@ -351,7 +353,7 @@ def ring(count: int, height: float, *, places: bool) -> str:
 
 
 @each("count", [2, 3, 5])
-def test_places_where_translations_should_be_are_recognised(
+def test_positions_in_place_of_translations_are_recognised(
     tmp_path: Path, count: int
 ) -> None:
     path = tmp_path / "left.json"
@@ -398,7 +400,7 @@ def test_of_random_rigs_few_are_mistaken_and_most_places_are_recognised() -> Non
         assert right >= least_right * 500
 
 
-def test_cameras_beside_each_other_are_no_places(tmp_path: Path) -> None:
+def test_parallel_cameras_are_not_mistaken_for_places(tmp_path: Path) -> None:
     """Cameras of a stereo rig look in one direction, and the world may be the first of them."""
     tables = {
         name: {"K": programs.K, "R": np.eye(3).tolist(), "T": [moved, 0.0, 0.0]}

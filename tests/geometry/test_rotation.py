@@ -143,9 +143,7 @@ def test_y_is_taken_to_any_direction() -> None:
     )
 
 
-def test_the_shortest_turn_takes_one_direction_to_another_about_what_is_across_both() -> (
-    None
-):
+def test_the_shortest_turn_is_about_the_axis_perpendicular_to_both_directions() -> None:
     rng = np.random.default_rng(4)
     start, end = rng.normal(size=(2, 50, 3))
     start[0], end[0] = (1.0, 2.0, 3.0), (-2.0, -4.0, -6.0)  # half a turn
@@ -180,7 +178,7 @@ def test_steady_angles_are_the_same_rotations_without_jumps() -> None:
     )
 
 
-def test_unwrapped_passes_over_what_is_unknown() -> None:
+def test_unwrapping_skips_unknown_values() -> None:
     series = np.array([3.0, np.nan, np.nan, -3.1, -3.0])
     np.testing.assert_allclose(
         unwrapped(series), [3.0, np.nan, np.nan, 2 * np.pi - 3.1, 2 * np.pi - 3.0]

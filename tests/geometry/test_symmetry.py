@@ -80,7 +80,7 @@ def test_twice_is_as_before(name: str, skeleton: Skeleton) -> None:
 
 
 @each("skeleton", [SKELETON, lopsided()])
-def test_mirrored_joints_are_those_of_the_other_side_across_the_plane_that_is_faced_along(
+def test_mirrored_joints_are_reflected_in_the_sagittal_plane(
     skeleton: Skeleton,
 ) -> None:
     poses = drawn()

@@ -137,7 +137,7 @@ def test_a_track_with_numpys_arguments_is_written(tmp_path: Path) -> None:
         ([["a.png", "b.npz"]], "source must have image files or masks in the list"),
     ],
 )
-def test_what_is_no_source_is_refused_before_any_work(
+def test_a_file_that_is_not_a_source_is_refused_before_any_work(
     source: Any, message: str, tmp_path: Path
 ) -> None:
     with pytest.raises(InputError, match=message):

@@ -149,7 +149,7 @@ def test_an_environments_evaluations_are_what_its_steps_drew(
 
 
 @pytest.mark.parametrize("count", [1, 3])
-def test_a_driven_environment_counts_what_it_is_driven_for(count: int) -> None:
+def test_a_driven_environment_counts_the_evaluations_of_the_search(count: int) -> None:
     env = gym.make_vec("posefit/FitImage-v1", count, instance=3, max_evaluations=13)
     poses = PoseCount()
     with poses.counting():

@@ -211,7 +211,7 @@ def test_mirrored_masks_are_the_mirrored_view(tmp_path: Path, kind: str) -> None
 
 
 @pytest.mark.parametrize("kind", [*MASKS, *MOTIONS, *NAMED])
-def test_what_is_extracted_of_masks_and_motions_shows_what_they_show(
+def test_extracted_masks_equal_the_given_masks_and_motions(
     tmp_path: Path, kind: str
 ) -> None:
     if kind in MASKS:

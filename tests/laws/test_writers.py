@@ -331,7 +331,7 @@ def cases() -> Iterator[Case]:
         )
 
 
-def test_every_file_states_its_times_here_or_has_none() -> None:
+def test_every_file_with_times_is_tested_here() -> None:
     assert {*TIMES} | TIMELESS == set(FILES)
     assert not {*TIMES} & TIMELESS
 
@@ -426,7 +426,7 @@ def test_masks_are_extracted_with_or_without_a_preview(
 
 
 @each("failure", FAILURES)
-def test_what_fails_of_a_video_is_said_before_the_work_and_costs_nothing_else(
+def test_a_video_that_cannot_be_written_is_reported_before_the_work(
     failure: Exception, tmp_path: Path
 ) -> None:
     def fail(*_: object) -> None:
@@ -470,7 +470,7 @@ def test_a_picture_that_fails_costs_only_itself(
     assert {warning.split()[0] for warning in warnings} == missing
 
 
-def test_footage_that_is_gone_after_the_work_costs_no_picture(tmp_path: Path) -> None:
+def test_footage_deleted_during_the_work_loses_only_pictures(tmp_path: Path) -> None:
     def pictures() -> Iterator[Any]:
         yield np.full((48, 64, 3), 200, np.uint8)
         raise InputError("film.mp4: expected a video file, got nothing of that name")
@@ -513,6 +513,7 @@ def test_each_file_is_written_alone_as_it_is_among_all(tmp_path: Path) -> None:
         (["trc", "bvh"], ("bvh", "trc", "summary")),
         (("frames.csv",), ("frames", "summary")),
         ("summary", ("summary",)),
+        ("amc", ("asf", "amc", "summary")),
     ],
 )
 def test_files_are_chosen_by_their_kinds_or_names(write: Any, kinds: Any) -> None:
@@ -675,7 +676,7 @@ def test_the_table_in_python_is_that_of_the_files(case: Case, tmp_path: Path) ->
     np.testing.assert_array_equal(table["left_knee_flexion"].isna(), held)
 
 
-def test_a_trc_leaves_out_the_frames_of_which_nothing_is_known(tmp_path: Path) -> None:
+def test_a_trc_leaves_out_unknown_frames(tmp_path: Path) -> None:
     case = Case(fps=119.88, count=6, first=10, held=(0, 2, 5))
     track = written(case, tmp_path / "out")
     head, numbers, _, points = read_trc(tmp_path / "out" / "track.trc")
@@ -693,7 +694,7 @@ def test_a_trc_leaves_out_the_frames_of_which_nothing_is_known(tmp_path: Path) -
     }
 
 
-def test_a_trc_of_which_nothing_is_known_has_blank_rows(tmp_path: Path) -> None:
+def test_a_trc_of_unknown_frames_only_has_blank_rows(tmp_path: Path) -> None:
     written(Case(count=3, held=(0, 1, 2)), tmp_path / "out")
     _, numbers, times, points = read_trc(tmp_path / "out" / "track.trc")
     assert numbers.tolist() == [1, 2, 3]

@@ -318,7 +318,7 @@ def test_a_part_of_a_motion_keeps_its_frame_numbers_and_times(
     assert walk.frames(20, 80).frames(5, 10).first == 25
 
 
-def test_steps_are_written_one_a_row(walk: Motion, tmp_path: Path) -> None:
+def test_each_step_has_a_row(walk: Motion, tmp_path: Path) -> None:
     gait = gait_of(walk)
     write_gait(tmp_path / "gait.csv", gait)
     rows = csv_rows(tmp_path / "gait.csv")

@@ -93,7 +93,9 @@ WAITING = replace(
         (WAITING, "steps of a walk in 3.6 of 14.2 s"),
     ],
 )
-def test_what_is_no_walk_has_a_reason_and_no_figures(motion: Motion, why: str) -> None:
+def test_a_motion_that_is_not_a_walk_has_a_reason_and_no_figures(
+    motion: Motion, why: str
+) -> None:
     gait = gait_of(motion)
     assert why in gait.why
     assert figures(gait) == [None] * 6
@@ -196,7 +198,7 @@ def test_left_and_right_of_a_limp_are_apart(
 
 
 @each(("lengths", "seconds"), LIMPS)
-def test_of_who_walks_in_place_only_times_are_known(
+def test_walking_in_place_gives_only_times(
     lengths: tuple[float, float], seconds: tuple[float, float]
 ) -> None:
     # a belt that moves a little slower than they

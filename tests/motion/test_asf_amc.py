@@ -341,7 +341,7 @@ def test_mistakes_in_a_motion_are_named(
     assert f"{path}{message}" in str(caught.value)
 
 
-def test_what_a_file_cannot_hold_is_not_written(
+def test_values_that_a_file_cannot_hold_are_not_written(
     skeleton: Skeleton, tmp_path: Path
 ) -> None:
     poses = np.zeros((1, ANGLES))

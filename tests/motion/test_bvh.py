@@ -391,7 +391,7 @@ def test_angles_are_written_without_jumps(tmp_path: Path) -> None:
     )
 
 
-def test_what_comes_out_of_a_file_has_a_limit(
+def test_the_unpacked_size_of_a_file_is_limited(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "a.bvh"

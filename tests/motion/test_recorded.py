@@ -10,9 +10,7 @@ from posefit.motion import recorded
 from tests.commands import printed
 
 
-def test_the_files_are_small_and_say_where_they_come_from_and_open_without_pickle() -> (
-    None
-):
+def test_the_files_are_small_name_their_origin_and_open_without_pickle() -> None:
     path = files("posefit.motion") / "recorded.npz"
     assert len(path.read_bytes()) < 3_000_000
     built_in = (files("posefit.motion") / "built_in.json").read_text(encoding="utf-8")

@@ -51,7 +51,7 @@ def linted(path, text):
     return done.returncode, done.stdout
 
 
-def test_the_linter_accepts_whole_scripts_and_rejects_planted_mistakes(tmp_path):
+def test_the_linter_accepts_the_scripts_and_rejects_planted_mistakes(tmp_path):
     for page in (report_page, track_page):
         status, output = linted(
             tmp_path / "page.js", one_script(page.__name__, page.SCRIPTS)

@@ -92,7 +92,7 @@ def test_no_thread_outlives_its_search_or_an_error_in_it() -> None:
     assert bridges() <= before
 
 
-def test_what_the_library_raises_is_raised_where_it_is_asked() -> None:
+def test_an_error_of_the_library_is_raised_by_ask() -> None:
     with pytest.raises(RuntimeError, match="the library failed: OSError: out of paper"):
         minimise(Problem(sphere, Toy(3), 100), bridge(fails, Toy(3)))
 

@@ -65,9 +65,7 @@ def test_last_digits_of_a_library_of_linear_algebra_change_nothing_of_a_prior() 
         np.testing.assert_array_equal(value, other[name], err_msg=name)
 
 
-def test_the_same_poses_have_the_same_clusters_and_fewer_than_asked_are_centres_each() -> (
-    None
-):
+def test_equal_poses_have_equal_clusters_and_few_poses_are_a_centre_each() -> None:
     poses = angles("walk-a")
     centres, _ = clusters_of(poses, 5, 0.99)
     assert centres.shape == (5, 63)

@@ -72,7 +72,7 @@ def test_a_place_that_is_not_known_is_found_in_the_masks(method: str) -> None:
     assert np.isfinite(track.motion.translations).all()
 
 
-def test_without_training_there_is_one_line() -> None:
+def test_without_training_there_is_reported_in_one_line() -> None:
     task = replace(scene()[0], training=())
     for name in TRACKERS:
         with pytest.raises(ValueError, match="training must hold a motion"):
@@ -128,7 +128,7 @@ def test_a_camera_that_knows_nothing_does_not_count() -> None:
     assert len(set(costs)) == 1
 
 
-def test_a_mask_says_where_the_root_is() -> None:
+def test_a_mask_gives_the_position_of_the_root() -> None:
     task, motion, (observation, *_) = scene()
     pose = motion.poses[0]
     place = motion.translations[0]

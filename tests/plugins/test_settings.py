@@ -370,7 +370,7 @@ def test_a_list_of_settings_is_read_from_a_docstring() -> None:
     assert settings_in("Settings stand in prose.") == {}
 
 
-def test_every_setting_is_listed_in_its_order_and_nothing_else_is() -> None:
+def test_the_settings_are_listed_in_order_and_only_they() -> None:
     offers = [
         offer for of_kind in registry().offers.values() for offer in of_kind.values()
     ]

@@ -111,13 +111,13 @@ def test_after_a_long_gap_the_track_is_lost_and_estimated_again() -> None:
     assert iou(frames)[76:].mean() > 0.5
 
 
-def test_nothing_is_ever_seen() -> None:
+def test_frames_that_never_show_the_person() -> None:
     task, observations = seen(frames=5)
     frames = follow(task, [blank(one) for one in observations])
     assert all(frame.details["lost"] and frame.evaluations == 0 for frame in frames)
 
 
-def test_what_is_no_person_is_no_reason_to_fail() -> None:
+def test_moving_things_other_than_people_do_not_fail_a_track() -> None:
     task, observations = seen(frames=24)
     rows, columns = np.mgrid[: SIZE[1], : SIZE[0]]
     # its skeleton is a point: no end points
@@ -196,7 +196,7 @@ def test_a_setting_counts_for_every_variant() -> None:
 
 
 @each("variant", ["default", "patent"])
-def test_a_hidden_joint_is_where_its_own_filter_has_it(
+def test_a_hidden_joint_is_at_the_position_that_its_filter_predicts(
     variant: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     task, observations = seen(frames=5)

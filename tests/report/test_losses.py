@@ -65,7 +65,7 @@ def sweeps(
 
 
 @pytest.mark.parametrize("error_of_lost", [1.0, 3.0])
-def test_a_method_that_loses_tracks_never_leads_one_equal_but_for_them(
+def test_a_method_that_loses_tracks_never_leads_an_otherwise_equal_one(
     contest: Contest, error_of_lost: float
 ) -> None:
     first = dict.fromkeys(METHODS, 0)

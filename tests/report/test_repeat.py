@@ -130,7 +130,7 @@ def test_a_row_is_run_again_by_the_first_digits_of_its_key(tmp_path: Path) -> No
     assert row["key"] == key
 
 
-def test_what_differs_in_a_row_that_is_run_again_is_printed(tmp_path: Path) -> None:
+def test_differences_of_a_row_that_is_run_again_are_printed(tmp_path: Path) -> None:
     made = run_cell(cell_of(SMALL | SPECS[0]))
     iou = made["iou"]
     made["iou"] = 0.25
@@ -144,7 +144,9 @@ def test_what_differs_in_a_row_that_is_run_again_is_printed(tmp_path: Path) -> N
     assert [entry.name for entry in tmp_path.iterdir()] == ["results"]
 
 
-def test_a_key_that_no_row_or_several_have_is_one_line(tmp_path: Path) -> None:
+def test_a_key_that_no_row_or_several_have_is_reported_in_one_line(
+    tmp_path: Path,
+) -> None:
     made = []
     for seed in range(1000):
         cell = cell_of(SMALL | SPECS[0] | {"seed": seed})

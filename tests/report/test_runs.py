@@ -160,7 +160,7 @@ def test_reports_of_some_methods_name_them_as_the_report_of_all_does(
         runs_in(path, "sapso")
 
 
-def test_of_versions_the_installed_one_counts_or_else_the_last(tmp_path: Path) -> None:
+def test_the_installed_version_counts_or_else_the_latest(tmp_path: Path) -> None:
     def of(version: str, seed: int = 0, **more: Any) -> dict[str, Any]:
         return result(replace(FIRST, version=version, seed=seed, **more), 1.0)
 

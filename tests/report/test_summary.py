@@ -113,7 +113,7 @@ def test_one_method_alone_one_run_alone_and_a_leader_behind_the_baselines(
         assert any(text in sentence for sentence in made), (text, made)
 
 
-def test_names_with_commas_stand_between_semicolons() -> None:
+def test_names_with_commas_are_separated_by_semicolons() -> None:
     assert listed(["a (x 1, y 2)", "b", "c"]) == "a (x 1, y 2); b; and c"
     assert listed(["a", "b", "c"]) == "a, b and c"
     assert listed(["a", "b", "c", "d", "e"]) == "a, b, c and 2 others"

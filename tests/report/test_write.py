@@ -264,7 +264,9 @@ MISTAKES = [
 ]
 
 
-def test_mistakes_are_one_line_and_write_nothing(results: Path, tmp_path: Path) -> None:
+def test_mistakes_are_reported_in_one_line_and_write_nothing(
+    results: Path, tmp_path: Path
+) -> None:
     ledger(tmp_path / "EMPTY", [])
     (tmp_path / "OTHER.html").write_text("<p>mine</p>")
     (tmp_path / "DIR.html").mkdir()
@@ -285,7 +287,7 @@ def test_mistakes_are_one_line_and_write_nothing(results: Path, tmp_path: Path) 
     assert (tmp_path / "OTHER.html").read_text() == "<p>mine</p>"
 
 
-def test_what_an_earlier_report_wrote_is_replaced_by_every_option(
+def test_every_option_replaces_the_files_of_an_earlier_report(
     results: Path, tmp_path: Path
 ) -> None:
     pytest.importorskip("matplotlib")
@@ -353,7 +355,7 @@ def test_a_latex_table_has_the_leaderboard_with_its_signs_escaped(
     )
 
 
-def test_without_matplotlib_figures_are_one_line_and_nothing_is_written(
+def test_without_matplotlib_figures_are_reported_in_one_line_and_nothing_is_written(
     results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)

@@ -87,7 +87,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, Re
         yield out, run("--quick", "--out", out)
 
 
-def test_mistakes_are_one_line_and_write_nothing(
+def test_mistakes_are_reported_in_one_line_and_write_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = tmp_path / "out"
@@ -141,7 +141,7 @@ def test_the_folder_holds_runs_tables_and_figures_and_the_command_continues(
 
 
 @pytest.mark.slow
-def test_tables_have_the_papers_numbers_beside_ours(
+def test_tables_show_the_papers_numbers_next_to_ours(
     written: tuple[Path, Result],
 ) -> None:
     out = written[0]
@@ -166,7 +166,7 @@ def shifted(motions: dict[str, PaperMotion], degrees: float, joint: slice) -> Re
     )
 
 
-def test_errors_are_those_of_poses() -> None:
+def test_errors_are_computed_from_poses() -> None:
     motions = paper_motions(None, 5)
     free = motions["walk"].test.skeleton.free
     analysis = Analysis(shifted(motions, 3.0, slice(0, 66)), motions)

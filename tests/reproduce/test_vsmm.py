@@ -142,7 +142,7 @@ def test_a_tracker_that_is_always_right_makes_no_mistake(film: activities.Film) 
     assert (figures["filter"], figures["detection"]) == pytest.approx((1.0, 2.0))
 
 
-def test_what_is_late_or_wrong_is_counted(film: activities.Film) -> None:
+def test_late_and_wrong_switches_are_counted(film: activities.Film) -> None:
     arrays = right(film)
     # for ten frames all models are tried; G1 stays: waving and striding shares the model `walk` with stepping, and
     # jumping jacks, 140 frames, and squats, 60, do not

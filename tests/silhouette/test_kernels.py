@@ -192,9 +192,7 @@ def test_a_joint_is_drawn_from_5_cm_to_the_far_end() -> None:
         assert mask.any() == (NEAR <= depth <= FAR)
 
 
-def test_what_is_no_number_spoils_no_other_pose_and_without_a_place_nothing_is_drawn(
-    body, camera
-) -> None:
+def test_a_pose_that_is_nan_spoils_no_other_and_is_not_drawn(body, camera) -> None:
     rng = np.random.default_rng(15)
     poses = random_poses(rng, 5)
     translations = rng.uniform(-0.3, 0.3, (5, 3))
@@ -291,7 +289,7 @@ def test_an_error_in_a_part_is_raised(threads: int) -> None:
         work_through(parts_of(1000, threads), threads, lambda part: (), work)
 
 
-def test_poses_that_other_threads_draw_are_counted_for_the_one_who_asked() -> None:
+def test_poses_drawn_by_other_threads_count_for_the_caller() -> None:
     counts = [PoseCount(), PoseCount()]
 
     def ask(count: PoseCount, n: int) -> None:

@@ -83,7 +83,7 @@ def test_the_bits_of_a_silhouette_lie_within_the_known_ones(
     np.testing.assert_array_equal(unpack(observed, width, height), silhouette.mask)
 
 
-def test_small_pieces_apart_have_no_say_in_where_the_borders_are() -> None:
+def test_small_separate_pieces_do_not_move_the_borders() -> None:
     mask = np.zeros((60, 80), dtype=bool)
     mask[10:50, 30:40] = True  # 400 pixels
     mask[5:9, 60:65] = True  # 20, five per cent of them
@@ -121,7 +121,7 @@ def test_half_and_quarter_size_by_hand() -> None:
     assert (small.width, small.height) == (2, 1)
 
 
-def test_a_body_seen_small_is_the_body_drawn_at_full_size_and_looked_at_there(
+def test_a_coarser_picture_has_every_kth_pixel_of_the_full_size(
     body: Body,
 ) -> None:
     for size in [(96, 72), (101, 75), (321, 240)]:

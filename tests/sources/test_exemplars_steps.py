@@ -57,7 +57,7 @@ def shares(costs: dict[tuple[int, ...], float], frame: int) -> Array:
 
 
 # RABINER1989 (forward)
-def test_a_state_is_as_likely_as_all_ways_to_it_together() -> None:
+def test_a_state_is_as_likely_as_all_paths_to_it_together() -> None:
     for seed in [0, 1, 2]:
         one = model(seed)
         for k, frame in enumerate(one.frames):
@@ -67,7 +67,7 @@ def test_a_state_is_as_likely_as_all_ways_to_it_together() -> None:
 
 
 # RABINER1989 (backward)
-def test_what_follows_weighs_a_state_as_all_ways_on_from_it_do() -> None:
+def test_backward_weights_are_sums_over_all_paths_from_a_state() -> None:
     for seed in [0, 1, 2]:
         one = model(seed)
         for first, count in combinations(range(len(SIZES) + 1), 2):
@@ -77,7 +77,7 @@ def test_what_follows_weighs_a_state_as_all_ways_on_from_it_do() -> None:
             )
 
 
-def test_the_way_that_is_told_is_the_cheapest_of_all() -> None:  # RABINER1989 (Viterbi)
+def test_the_reported_path_is_the_cheapest() -> None:  # RABINER1989 (Viterbi)
     for seed in [0, 1, 2]:
         one = model(seed)
         for count in range(1, len(SIZES) + 1):
@@ -122,7 +122,7 @@ def test_likelihood_is_an_exponential_of_the_distance_over_a_temperature() -> No
 
 
 # TOYAMA2001 (dynamics)
-def test_a_step_is_as_likely_as_the_clips_have_gone_on_so() -> None:
+def test_a_step_is_as_likely_as_it_is_frequent_in_the_clips() -> None:
     # a clip of 30 frames a second: who does what it did next pays nothing, who is 3 cm off half a unit
     walk = built_in.motion("walk-a", frames=20)
     clips = Exemplars.of([walk], average_skeleton())
@@ -153,7 +153,7 @@ def tempered(one: Model, power: float) -> Model:
 
 
 # GODSILL2004 (messages)
-def test_a_message_is_the_share_of_all_ways_on_from_a_state() -> None:
+def test_a_message_is_the_share_of_all_paths_from_a_state() -> None:
     for power in POWERS:
         one = model(0)
         found = markov.backward_messages(one.frames[1:], power)
@@ -171,7 +171,7 @@ def test_a_message_is_the_share_of_all_ways_on_from_a_state() -> None:
         )
 
 
-def test_ways_are_drawn_as_often_as_they_are_likely() -> None:  # GODSILL2004 (step)
+def test_paths_are_sampled_as_often_as_they_are_likely() -> None:  # GODSILL2004 (step)
     for power in POWERS:
         one = model(1)
         count = 40_000

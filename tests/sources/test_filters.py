@@ -94,7 +94,9 @@ def test_beta_lets_the_wanted_share_survive() -> None:  # DEUTSCHER2005 (beta)
         assert sharpness(10.0 * costs, wanted) == pytest.approx(beta / 10.0)
 
 
-def test_beta_has_an_answer_where_no_share_can_be_had() -> None:  # DEUTSCHER2005 (beta)
+def test_beta_is_defined_even_if_no_share_can_be_reached() -> (
+    None
+):  # DEUTSCHER2005 (beta)
     # a quarter survives at most
     assert sharpness(np.array([1.0, np.inf, np.nan, np.inf]), 0.5) == 0.0
     assert sharpness(np.zeros(10), 0.5) > 1e12  # all survive at any beta

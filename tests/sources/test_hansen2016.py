@@ -128,7 +128,7 @@ def test_eq_42_the_mean_moves_by_a_step_size_times_the_step() -> None:
 
 
 # HANSEN2016 (43)
-def test_eq_43_the_step_sizes_path_adds_the_step_as_it_would_be_on_a_sphere() -> None:
+def test_eq_43_the_path_of_the_step_size_adds_the_whitened_step() -> None:
     one = learnt()
     fresh = (
         np.sqrt(EIGHT.c_sigma * (2.0 - EIGHT.c_sigma) * EIGHT.mu_eff)
@@ -143,7 +143,7 @@ def test_eq_43_the_step_sizes_path_adds_the_step_as_it_would_be_on_a_sphere() ->
 
 
 # HANSEN2016 (44)
-def test_eq_44_the_step_size_grows_where_the_path_is_longer_than_by_chance() -> None:
+def test_eq_44_the_step_size_grows_if_the_path_is_longer_than_by_chance() -> None:
     for far in (0.0, 2.0):
         one = learnt(far=far)
         share = np.linalg.norm(one.after.step_path) / EIGHT.chi
@@ -155,7 +155,9 @@ def test_eq_44_the_step_size_grows_where_the_path_is_longer_than_by_chance() -> 
 
 
 # HANSEN2016 (h_sigma)
-def test_h_sigma_stops_the_covariances_path_where_the_step_sizes_is_too_long() -> None:
+def test_h_sigma_stops_the_path_of_the_covariance_while_that_of_the_step_size_is_long() -> (
+    None
+):
     near = learnt()
     far = learnt(far=5.0)
     assert (heeded(near), heeded(far)) == (1.0, 0.0)
@@ -175,7 +177,7 @@ def test_eq_45_the_covariances_path_adds_the_step() -> None:  # HANSEN2016 (45)
 
 
 # HANSEN2016 (46)
-def test_eq_46_a_bad_step_weighs_as_if_it_were_as_long_as_the_dimensions_say() -> None:
+def test_eq_46_negative_weights_are_scaled_to_the_length_of_a_typical_step() -> None:
     # far away proposals that are bad take away no more than ones nearby: sqrt(d) long they would weigh as they are
     good = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0]])
     taken = []
@@ -325,7 +327,7 @@ def test_chi_is_how_long_a_standard_normal_vector_is() -> None:  # HANSEN2016 (c
 
 
 # HANSEN2016 (B.2)
-def test_b_2_axes_are_decomposed_every_so_many_generations() -> None:
+def test_b_2_axes_are_decomposed_at_regular_intervals() -> None:
     # 200 dimensions, four proposals: 0.1 / (200 (c_1 + c_mu)), c_1 = 2 / (201.3^2 + 1.459792) = 4.9354e-5 and
     # c_mu = 2 (1.459792 - 2 + 0.685029) / (202^2 + 1.459792) = 7.0938e-6, is 8.86
     strategy = Strategy(np.zeros(200), np.ones(200), 4)
@@ -340,7 +342,7 @@ def test_b_2_axes_are_decomposed_every_so_many_generations() -> None:
 
 
 # HANSEN2016 (B.3)
-def test_b_3_a_search_ends_where_nothing_changes_any_more_or_it_diverges() -> None:
+def test_b_3_a_search_ends_when_it_stagnates_or_diverges() -> None:
     def initial() -> Strategy:
         strategy = Strategy(np.array([0.3, -0.2]), np.array([0.1, 0.1]), 6)
         assert not strategy.ended()
@@ -377,7 +379,7 @@ def test_a_search_that_stagnates_starts_again_with_twice_the_population() -> Non
 
 
 # HANSEN2016 (B.5)
-def test_b_5_what_lies_beyond_the_box_ranks_behind_all_that_is_in_it(
+def test_b_5_points_outside_the_box_rank_behind_all_points_inside(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     start = Start(np.array([1.0, 0.0]), np.array([0.3, 0.01]), np.zeros(2))

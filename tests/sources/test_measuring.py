@@ -175,7 +175,7 @@ def test_stance_is_its_share_of_a_stride() -> None:  # WHITTLE2007 (stance)
 
 
 # ALEXANDER1989 (Froude number)
-def test_who_is_faster_than_the_root_of_half_of_gravity_times_a_leg_runs() -> None:
+def test_a_person_with_a_froude_number_above_a_half_runs() -> None:
     skeleton = walker().skeleton
     leg = float(
         np.linalg.norm(

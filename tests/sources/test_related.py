@@ -216,7 +216,7 @@ def test_a_swarm_shifts_the_particles() -> None:  # KRZESZOWSKI2010 (shift)
 
 
 # KRZESZOWSKI2010 (weights)
-def test_particles_survive_by_the_weights_of_where_they_were_brought() -> None:
+def test_particles_survive_by_their_weights_after_the_move() -> None:
     optimiser = PSOPF(
         Toy(1), rng(), evaluations=4000, iterations=0, sharpness=2.0, noise=1e-9
     )
@@ -281,7 +281,7 @@ def test_latents_are_lengths_along_the_manifold() -> None:  # WANG2003 (Isomap)
 
 
 # WANG2003 (way back)
-def test_the_way_back_is_a_linear_model_of_the_nearest_poses() -> None:
+def test_the_inverse_is_a_linear_model_of_the_nearest_poses() -> None:
     rng = np.random.default_rng(0)
     centres = rng.uniform(-1.0, 1.0, (400, 2))
     matrix = rng.standard_normal((2, 63))
@@ -320,7 +320,7 @@ def test_the_loss_is_that_of_a_gaussian_process_with_latents() -> None:
     )
 
 
-def test_each_angle_has_a_scale_of_its_own() -> None:  # URTASUN2005 (scales)
+def test_each_angle_has_a_separate_scale() -> None:  # URTASUN2005 (scales)
     _, poses = arc(40)
     larger = poses * np.linspace(1.0, 20.0, 63)
     first, second = (
@@ -418,7 +418,7 @@ def test_a_pose_is_predicted_at_constant_velocity() -> None:  # WACHTER1999 (pre
 
 
 # AGARWAL2006 (shape context)
-def test_contexts_say_where_the_other_points_are_wherever_the_mask_is() -> None:
+def test_shape_contexts_do_not_depend_on_the_position_of_the_mask() -> None:
     mask = np.zeros((60, 80), dtype=bool)
     mask[10:30, 20:28] = True
     shapes = contexts(mask)

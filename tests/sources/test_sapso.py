@@ -456,7 +456,7 @@ def stepped(
 
 
 # Interpretation S7
-def test_what_is_drawn_again_has_the_distribution_of_what_is_allowed() -> None:
+def test_redrawn_points_have_the_distribution_of_the_feasible_part() -> None:
     velocity, position = stepped(3000, 100)
     np.testing.assert_allclose(velocity, position + 1.0)  # both are of the same draw
     assert position[:, 0].max() < FEASIBLE

@@ -301,7 +301,7 @@ def test_an_elbow_is_as_far_from_the_hand_as_from_the_shoulder() -> None:  # VSM
         )
 
 
-def test_a_hidden_joint_goes_on_as_it_went() -> None:  # VSMM 2.7
+def test_a_hidden_joint_moves_on_at_its_last_velocity() -> None:  # VSMM 2.7
     points = np.zeros((17, 2))
     sure = np.ones(17)
     variances = np.full((17, 2), 0.01)
@@ -359,7 +359,9 @@ def test_ridge_regression_is_least_squares_with_more_rows() -> None:  # VSMM 3
     assert np.allclose(ridge(inputs, after, 2.0), least_squares(inputs, after, 2.0).T)
 
 
-def test_the_errors_of_plain_numbers_are_those_of_turns() -> None:  # Interpretation V4
+def test_the_errors_of_plain_numbers_equal_those_of_rotations() -> (
+    None
+):  # Interpretation V4
     states = encode(built_in.motion("jacks").poses[:1], np.ones((1, 3)))
     slow = (
         np.array(
@@ -422,7 +424,7 @@ def test_a_models_step_is_the_same_from_any_place_and_heading() -> None:
     assert (same * Rotation.from_quat(first[3:7], scalar_first=True)).magnitude() < 1e-9
 
 
-def test_the_groups_are_those_of_the_reading() -> None:  # VSMM 4
+def test_the_groups_follow_the_interpretation() -> None:  # VSMM 4
     names = {
         "G1": "stiff-walk walk arms-out",
         "G2": "arms-out jacks jump",
@@ -445,7 +447,7 @@ def running(**settings: Any) -> Switching:
     return TrackFilter(VSMM(task, **settings), np.random.default_rng(0)).switching
 
 
-def test_process_noise_is_a_multiple_of_the_models_own() -> None:  # Interpretation V7
+def test_process_noise_is_a_multiple_of_the_models_noise() -> None:  # Interpretation V7
     assert np.allclose(
         running(process_noise=2.0).models.noises, 2.0 * running().models.noises
     )
@@ -578,7 +580,7 @@ def swinging(changes_degrees: Sequence[Sequence[float]]) -> list[Array]:
 
 
 # Interpretation V15
-def test_limb_angles_are_those_of_thighs_shanks_and_hips() -> None:
+def test_limb_angles_are_measured_at_thighs_shanks_and_hips() -> None:
     first, second = (
         limb_angles(points) for points in swinging([[10.0, -20.0, 30.0, 5.0]])
     )
@@ -785,7 +787,7 @@ def decided(
 
 
 # VSMM 9
-def test_the_patents_test_has_limits_of_09_and_1_on_what_came_since_k0() -> None:
+def test_the_patents_test_has_limits_of_09_and_1_on_frames_since_k0() -> None:
     assert decided([([0.6, 0.4], [1.0, 1.0])]) == ["old"]  # 0.4 / 0.6 < 0.9
     assert decided([([0.51, 0.49], [1.0, 1.0])]) == [None]  # 0.96
     assert decided([([0.4, 0.6], [1.0, 2.0])]) == ["new"]

@@ -14,7 +14,7 @@ from tests.cases import each
 from tests.statistics.studies import DRAWS, SHAPES, coverage, shown_coverage
 
 
-def test_of_one_stratum_of_single_values_it_is_students_interval() -> None:
+def test_one_stratum_of_single_values_gives_students_interval() -> None:
     interval = mean_interval([1.0, 2.0, 3.0, 4.0], [0] * 4, range(4))
     assert interval.value == 2.5
     # t of 3 degrees of freedom at 97.5 %: any table
@@ -86,7 +86,7 @@ def test_intervals_of_runs_hold_the_truth(shape: tuple[int, int]) -> None:
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_intervals_that_are_shown_where_few_runs_are_lost_hold_the_truth(
+def test_intervals_shown_with_few_lost_runs_contain_the_truth(
     shape: tuple[int, int],
 ) -> None:
     for share in (0.05, 0.15, 0.3):

@@ -54,7 +54,7 @@ def test_p_is_at_least_the_p_of_a_sign_test(blocks):
     assert math.isnan(pair.low) == (blocks < 6)
 
 
-def test_an_interval_excludes_0_just_where_the_adjusted_p_is_below_5_percent():
+def test_an_interval_excludes_0_exactly_if_the_adjusted_p_is_below_5_percent():
     rng = np.random.default_rng(11)
     shown = 0
     for _ in range(40):

@@ -56,7 +56,7 @@ def test_a_method_that_shares_less_than_half_of_the_runs_is_left_out(
     assert of([*ALL, *((2, 7, seed) for seed in range(late))]).methods == methods
 
 
-def test_nothing_is_shared_where_no_run_has_an_error() -> None:
+def test_no_error_is_shared_if_no_run_has_one() -> None:
     assert of([]) is None
     assert of(ALL, [np.nan] * len(ALL)) is None
     assert of([(0, 0, 0), (1, 0, 1)]).methods == (0,)

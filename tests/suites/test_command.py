@@ -288,7 +288,7 @@ def test_the_ledger_is_a_table(results: Path) -> None:
         (["run", "sapso", "--set", "foo=1"], "a setting of sapso must be one of .*, got 'foo'"),
     ],
 )  # fmt: skip
-def test_a_mistake_is_one_line_and_status_2(
+def test_a_mistake_is_reported_in_one_line_and_status_2(
     words: list[Any], message: str, tmp_path: Path, monkeypatch: Any
 ) -> None:
     monkeypatch.chdir(tmp_path)

@@ -56,7 +56,7 @@ def test_a_cost_is_a_ratio_of_whole_numbers_of_pixels(
     assert costs == pytest.approx(100.0 * shares.mean(axis=0), abs=1e-12)
 
 
-def test_the_true_pose_is_in_the_box_and_the_optimum_where_it_is_known() -> None:
+def test_the_true_pose_is_in_the_box_and_is_the_known_optimum() -> None:
     for function, number in product(FUNCTIONS, (1, 2, 10_001, 10_002)):
         for dimension in function.dimensions:
             posed = problem(function.number, number, dimension)
@@ -175,7 +175,7 @@ def test_an_infeasible_proposal_costs_as_much_as_its_repair() -> None:
         assert posed(np.full(posed.dimension, 3.0)) == posed(np.ones(posed.dimension))
 
 
-def test_what_is_not_feasible_may_be_rejected_or_penalised_instead() -> None:
+def test_infeasible_proposals_may_be_rejected_or_penalised_instead() -> None:
     bad = infeasible(problem())
     repaired = problem()(bad)
     rejecting = problem(infeasible="reject")
@@ -352,7 +352,9 @@ def test_a_copy_of_a_problem_counts_for_itself(
         ),
     ],
 )
-def test_what_is_no_problem_is_named(make: Callable[[], object], message: str) -> None:
+def test_an_object_that_is_not_a_problem_is_named(
+    make: Callable[[], object], message: str
+) -> None:
     with pytest.raises(ValueError, match=message):
         make()
 

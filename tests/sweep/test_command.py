@@ -95,9 +95,7 @@ def test_a_preview_finds_a_setting_that_a_factory_refuses(plan: Path) -> None:
     assert "sapso@pca with sapso.inertia=-1.0 fails in its first frames: " in message
 
 
-def test_cells_in_quarantine_are_tried_again_where_that_is_asked_for(
-    plan: Path, tmp_path: Path
-) -> None:
+def test_quarantined_cells_are_run_again_on_request(plan: Path, tmp_path: Path) -> None:
     plan.write_text(
         '[[cells]]\nmethod = "random@pca"\nmotion = "walk"\nframes = 1\nevaluations = 80\n'
     )
@@ -139,7 +137,7 @@ def test_cells_in_quarantine_are_tried_again_where_that_is_asked_for(
         (["BAD", "--out", "OUT", "--dry-run"], "bad.toml: defaults must hold"),
     ],
 )  # fmt: skip
-def test_mistakes_are_one_line_and_write_nothing(
+def test_mistakes_are_reported_in_one_line_and_write_nothing(
     words: list[str], message: str, plan: Path, tmp_path: Path
 ) -> None:
     (tmp_path / "bad.toml").write_text("[defaults]\nframe = 3\n")

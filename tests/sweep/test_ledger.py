@@ -136,7 +136,7 @@ def test_a_row_that_posefit_did_not_write_is_named_with_advice(
     assert len(rows_in(folder)) == 2
 
 
-def test_a_damaged_file_is_one_line_with_sqlites_own_reason_and_what_to_do(
+def test_a_damaged_file_is_reported_in_one_line_with_sqlites_own_reason_and_what_to_do(
     tmp_path: Path,
 ) -> None:
     folder = filled(tmp_path / "results", 200)
@@ -270,7 +270,7 @@ def test_a_ledger_is_not_made_through_a_link_that_leads_nowhere(tmp_path: Path) 
     assert not (tmp_path / "elsewhere").exists()
 
 
-def test_what_is_refused_leaves_nothing_behind(
+def test_a_refused_track_leaves_nothing_behind(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(*_: object) -> None:
@@ -304,7 +304,7 @@ def test_a_ledger_of_the_first_format_is_read_and_brought_to_todays(
         assert database.execute("SELECT sum(seed) FROM runs").fetchone() == (1,)
 
 
-def test_what_is_no_ledger_is_named(tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_ledger_is_named(tmp_path: Path) -> None:
     other, short, empty = (
         tmp_path / f"{name}.sqlite" for name in ("other", "short", "empty")
     )
@@ -424,7 +424,7 @@ def test_only_a_cells_own_faults_count_towards_its_three_attempts_and_fifty_loss
         assert len(ledger.planned()) == 2
 
 
-def test_what_ran_twice_is_written_once_and_a_cell_that_failed_is_run_last(
+def test_a_cell_that_ran_twice_is_written_once_and_a_failed_one_runs_last(
     tmp_path: Path,
 ) -> None:
     chosen = cells(3)
@@ -515,9 +515,7 @@ def test_rows_of_another_version_are_read_and_counted_and_their_cells_run_again(
         assert ledger.version == f"0.0.9 a1, {posefit_build().removeprefix('posefit ')}"
 
 
-def test_a_version_is_another_one_where_any_part_of_it_is_not_the_installed_one() -> (
-    None
-):
+def test_versions_differ_if_any_part_differs_from_the_installed_one() -> None:
     swarm = registry().offer("optimiser", "sapso").origin
     versions = [
         f"{posefit_build()}, {swarm}",

@@ -128,7 +128,7 @@ def test_the_processors_of_this_process_are_counted(
     assert cores() == 1
 
 
-def test_a_bad_cell_is_quarantined_after_three_attempts_and_tried_again_where_that_is_asked(
+def test_a_bad_cell_is_quarantined_after_three_attempts_and_run_again_on_request(
     tmp_path: Path,
 ) -> None:
     bad = cells(1, fake.RAISE)
@@ -153,9 +153,7 @@ def test_two_workers_run_two_cells_at_once(
     assert len({worker for _, worker in fake.starts(tmp_path / "starts")}) == 2
 
 
-def test_where_numba_is_loaded_already_a_worker_leaves_its_number_of_threads_alone() -> (
-    None
-):
+def test_a_worker_keeps_the_number_of_threads_if_numba_is_loaded() -> None:
     code = """
 import os
 os.environ["NUMBA_NUM_THREADS"] = "2"
@@ -172,7 +170,7 @@ assert cv2.getNumThreads() == 1
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
 
 
-def test_what_a_cell_leaves_behind_reaches_no_other_and_ends_with_the_sweep(
+def test_leftovers_of_a_cell_reach_no_other_cell_and_end_with_the_sweep(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     noted = tmp_path / "left"

@@ -75,7 +75,7 @@ class Chance(Random):
     baseline = False
 
 
-def test_chance_does_not_beat_chance_and_need_not_where_it_is_the_baseline() -> None:
+def test_random_search_fails_the_chance_rule_unless_it_is_the_baseline() -> None:
     def outcomes(factory: Any) -> list[tuple[str, str]]:
         checks = checks_of("optimiser", factory, None, "forget")
         ran = [
@@ -138,7 +138,7 @@ def test_it_fails_each_bug_planted_in_a_prior_or_a_filter() -> None:
         assert "next_frame" in failed, factory
 
 
-def test_a_prior_of_which_hardly_anything_is_feasible_passes_with_a_warning() -> None:
+def test_a_prior_with_a_tiny_feasible_part_passes_with_a_warning() -> None:
     def checked(share: float) -> str:
         class Picky(PCA):
             def feasible(self, latents: Array) -> Any:

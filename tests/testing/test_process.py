@@ -38,7 +38,7 @@ def posefit(*words: str) -> "subprocess.CompletedProcess[str]":
 
 @pytest.mark.parametrize("bug", planted.APART, ids=named)
 @pytest.mark.usefixtures("installed")
-def test_what_ends_a_process_fails_the_check_that_ran(
+def test_the_check_that_ran_fails_when_its_process_ends(
     bug: Any, monkeypatch: Any, capfd: Any
 ) -> None:
     if bug is planted.NeverReturns:
@@ -94,7 +94,7 @@ def test_a_name_that_two_plugins_register_is_checked_once_one_has_another(
 
 
 @pytest.mark.usefixtures("installed")
-def test_what_a_plugin_prints_is_in_no_result() -> None:
+def test_output_printed_by_a_plugin_is_in_no_result() -> None:
     checked = posefit(
         "check",
         "optimiser",

@@ -51,7 +51,7 @@ class ChangesTheBits(planted.Holds):
         return super().frame(observation)
 
 
-def test_an_honest_tracker_is_left_as_it_is() -> None:
+def test_an_honest_tracker_is_not_changed() -> None:
     task, _, observations = scene()
     plain = list(planted.Holds(task).track(observations, np.random.default_rng(0)))
     frames, warnings = audited(planted.Holds)
@@ -168,7 +168,7 @@ def test_a_tracker_that_breaks_a_rule_is_named(kind: Any, rule: str) -> None:
         audited(kind)
 
 
-def test_what_cannot_be_read_is_not_the_trackers_fault() -> None:
+def test_an_unreadable_frame_is_not_blamed_on_the_tracker() -> None:
     def broken() -> Any:
         yield scene()[2][0]
         raise ValueError("frame 1 of the video is damaged")

@@ -195,9 +195,7 @@ def test_the_distance_from_a_cone_is_that_from_the_nearest_of_all_its_discs(
         assert np.hypot(across, down) == pytest.approx(1.0)
 
 
-def test_pixels_have_their_distance_from_the_border_and_none_where_it_is_unknown() -> (
-    None
-):
+def test_pixels_have_their_distance_from_the_border_if_it_is_known() -> None:
     mask = np.zeros((1, 7), dtype=bool)
     around = np.ones((1, 7), dtype=bool)
     mask[0, 2:5] = True
@@ -229,7 +227,7 @@ def test_the_border_of_a_mask_is_where_it_meets_known_background() -> None:
     assert borders.metres == pytest.approx([camera.focal[0] / 4.0] * 2)
 
 
-def test_what_borders_pull_a_window_of_frames_to_is_that_of_a_slow_twin() -> None:
+def test_the_border_terms_of_a_window_equal_those_of_a_slow_twin() -> None:
     scene, motion = footage(3, (60.0, 150.0))
     body = scene.body
     skeleton = scene.body.skeleton
@@ -322,7 +320,7 @@ def test_the_gradient_of_the_border_points_is_that_of_their_squares() -> None:
     assert np.linalg.eigvalsh(curves).min() > -1e-6
 
 
-def test_the_pull_of_a_bone_is_that_of_its_whole_border_in_the_field() -> None:
+def test_the_pull_of_a_bone_equals_the_sum_over_its_whole_border() -> None:
     # the border of two discs' hull, as 4000 short edges, in a field that rises evenly: 0.6 a pixel along, 0.3 down
     joints = np.array([[22.3, 24.1], [44.2, 33.4]])
     radii = np.array([[7.2, 4.1]])
@@ -448,9 +446,7 @@ def test_cameras_that_are_turned_from_their_calibrations_come_back() -> None:
     assert (given.mean(axis=0) < 0.9 * placed.mean(axis=0)).all()
 
 
-def test_by_how_much_cameras_were_turned_is_said_and_nothing_where_they_were_not() -> (
-    None
-):
+def test_the_angle_of_turned_cameras_is_reported() -> None:
     scene, _ = footage(3, (0.0, 90.0))
     assert with_turns(scene, scene.cameras) is scene
     turned = replace(
@@ -497,7 +493,7 @@ def test_a_long_track_is_fitted_in_windows(monkeypatch: pytest.MonkeyPatch) -> N
     assert motion.skeleton is shape.body.skeleton
 
 
-def test_frames_that_are_not_usable_go_with_those_around_them() -> None:
+def test_unusable_frames_follow_the_usable_frames_around_them() -> None:
     scene, truth = footage()
     observations = list(scene.observations)
     observations[6] = replace(observations[6], usable=False)

@@ -108,7 +108,7 @@ def test_the_truth_has_its_own_bones_whatever_the_body_is() -> None:
     assert measures.error_degrees.mean == 0.0
 
 
-def test_acceleration_and_foot_slide_stand_beside_those_of_the_truth() -> None:
+def test_acceleration_and_foot_slide_are_compared_with_the_truth() -> None:
     scene = walk(40, size=(64, 48))
     exact = measures_of(scene)
     shaken = measures_of(scene, shaken_mm=10.0)
@@ -156,7 +156,7 @@ def test_nothing_is_reported_of_a_method_that_reports_no_certainty(
     ).all()
 
 
-def test_frames_that_are_swapped_count_among_those_that_are_known(scene: Scene) -> None:
+def test_swapped_frames_are_counted_among_known_ones(scene: Scene) -> None:
     frames = uncertain_frames(scene, [0.0, 0.0, 0.5, 0.5, 0.0, 0.0])
     for k in (1, 2):
         frames[k] = replace(

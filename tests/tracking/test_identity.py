@@ -29,7 +29,7 @@ def camera(azimuth: float) -> posefit.Camera:
 
 
 @each("method", ["sapso", "vsmm"])
-def test_a_track_goes_on_as_if_it_had_not_ended_too_early(
+def test_a_resumed_track_equals_an_uninterrupted_one(
     method: str, tmp_path: Path
 ) -> None:
     assert repr(camera(0.5)) == repr(camera(1.5))  # which is why texts are not enough

@@ -42,7 +42,7 @@ def test_a_search_is_made_once(method: dict[str, Any]) -> None:
 
 
 @pytest.mark.slow
-def test_compiling_is_announced_where_something_is_compiled_and_only_there(
+def test_compiling_is_announced_only_when_something_is_compiled(
     tmp_path: Path,
 ) -> None:
     words = [
@@ -194,7 +194,7 @@ def frames_of_builds(
     return [call for k, call in enumerate(calls) if call not in calls[:k]]
 
 
-def test_a_build_is_fitted_to_every_third_frame_if_there_are_so_many_from_where_the_person_is_shown_whole() -> (
+def test_a_build_is_fitted_to_every_third_frame_from_the_first_whole_person_on() -> (
     None
 ):
     scene = walk(40, [0.0, 90.0], (120, 90))
@@ -308,7 +308,7 @@ def test_footage_without_a_truth_needs_no_angles_of_the_whole_library(
     assert track.truth is None
 
 
-def test_where_searches_of_one_image_end_is_as_likely_as_it_is_cheap() -> None:
+def test_ends_of_searches_of_one_image_are_as_likely_as_they_are_cheap() -> None:
     costs = np.array([3.0, 1.0, 5.0])
     shares = np.exp([-1.0, 0.0, -2.0])  # two of cost are a factor of e
     posterior = posterior_of(np.zeros((3, 66)), np.zeros((3, 3)), costs)

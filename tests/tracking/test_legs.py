@@ -118,7 +118,7 @@ def test_only_stretches_that_may_cost_less_are_in_doubt() -> None:
     assert in_doubt([4, 6, 10], 1, costs, added, every) == ([4, 6], True)
 
 
-def test_stretches_in_doubt_are_those_of_trying_all_pairs_of_edges() -> None:
+def test_doubtful_stretches_equal_a_search_of_all_pairs_of_edges() -> None:
     rng = np.random.default_rng(7)
     for _ in range(200):
         frames = int(rng.integers(8, 60))
@@ -151,7 +151,7 @@ def test_stretches_in_doubt_are_those_of_trying_all_pairs_of_edges() -> None:
         assert in_doubt(edges, reach, costs, added, usable) == expected
 
 
-def test_landmarks_say_which_leg_is_the_left_one(
+def test_landmarks_tell_the_left_leg_from_the_right(
     film: tuple[Scene, list[Frame]],
 ) -> None:
     """Landmarks of half the frames are enough, and those of the others do not matter."""

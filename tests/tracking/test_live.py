@@ -226,7 +226,7 @@ def test_masks_in_a_pipe_become_poses_on_disk_also_if_it_breaks_off(
     )
 
 
-def test_what_a_stream_leaves_open_is_logged_and_its_calibrations_unit_counts(
+def test_guesses_about_a_stream_are_logged_and_the_calibrations_unit_counts(
     monkeypatch, every_frame, walk, tmp_path
 ):
     write_bvh(
@@ -300,7 +300,7 @@ def test_what_a_stream_leaves_open_is_logged_and_its_calibrations_unit_counts(
         ),
     ],
 )
-def test_what_a_stream_of_masks_cannot_be_tracked_with_is_refused(
+def test_options_that_do_not_suit_a_stream_of_masks_are_refused(
     options, expected, monkeypatch, every_frame, walk
 ):
     monkeypatch.setattr(

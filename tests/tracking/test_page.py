@@ -137,7 +137,7 @@ def test_pictures_of_leaves_stay_within_a_few_megabytes() -> None:
     assert image(coarse).shape[0] in {height for _, (height, _) in stills.FINENESS}
 
 
-def test_metres_are_whole_millimetres_and_what_is_not_known_has_a_number_of_its_own() -> (
+def test_metres_are_stored_as_millimetres_and_unknown_values_as_a_reserved_number() -> (
     None
 ):
     assert numbers(in_16_bits(np.array([0.0, 0.0014, -0.0016, 1.25]))).tolist() == [
@@ -154,7 +154,7 @@ def test_metres_are_whole_millimetres_and_what_is_not_known_has_a_number_of_its_
     ]
 
 
-def test_joints_angles_and_intervals_are_those_of_the_track(tmp_path: Path) -> None:
+def test_joints_angles_and_intervals_belong_to_the_track(tmp_path: Path) -> None:
     scene = walk(4)
     truth = scene.truth
     page = viewed(

@@ -64,7 +64,7 @@ def pixels(image: Any, colour: tuple[int, int, int], close: int = 0) -> int:
     )
 
 
-def test_an_unsure_limb_fades_on_the_masks_and_beside_them(
+def test_an_uncertain_limb_is_drawn_faintly_on_and_next_to_the_masks(
     scene: Scene, frame: Frame
 ) -> None:
     plain, half = painted(scene, frame)

@@ -49,7 +49,7 @@ def test_a_picture_is_looked_up_in_the_library_unless_other_motions_are_named(
     assert used == 0
 
 
-def test_a_pose_that_the_prior_does_not_know_is_said() -> None:
+def test_a_pose_outside_the_prior_is_reported() -> None:
     prior = PCA().fit(np.concatenate([motion.poses[:, 3:] for motion in WALKS]))
     skeleton = WALKS[0].skeleton
     pose = WALKS[0].poses[5]

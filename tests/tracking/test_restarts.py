@@ -244,7 +244,7 @@ def test_the_evaluations_of_all_hypotheses_are_counted(method: dict[str, Any]) -
     assert single.summary["hypotheses"] == []
 
 
-def test_interrupted_hypotheses_go_on_where_they_were(tmp_path: Path) -> None:
+def test_interrupted_hypotheses_continue_at_the_last_frame(tmp_path: Path) -> None:
     options: dict[str, Any] = {
         "hypotheses": 3,
         "seed": 1,
@@ -618,7 +618,7 @@ def test_a_track_that_gets_no_better_stays(
 
 
 @each(("number", "backwards"), [(1, True), (2, False)])
-def test_a_track_is_tracked_again_from_what_it_found_back_in_time_and_then_onward(
+def test_a_track_is_repeated_backwards_and_then_forwards_from_the_earlier_pass(
     number: int, backwards: bool
 ) -> None:
     frames = frames_facing(np.arange(28.0).tolist())

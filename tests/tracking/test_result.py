@@ -101,7 +101,7 @@ def test_warnings_are_shown_without_a_terminal(
     assert "warning: " in capsys.readouterr().err
 
 
-def test_joints_angles_and_the_table_are_those_of_the_motion(
+def test_joints_angles_and_table_belong_to_the_motion(
     track: posefit.Track,
 ) -> None:
     table = track.to_pandas()

@@ -72,12 +72,12 @@ def check_same(method: str, counts: tuple[int, ...], folder: Path, **how: Any) -
 
 
 @each("method", FILTERS)
-def test_a_filter_goes_on_with_its_particles(method: str, tmp_path: Path) -> None:
+def test_a_filter_continues_with_its_particles(method: str, tmp_path: Path) -> None:
     check_same(method, (1, 2, 4), tmp_path)
 
 
 @each("method", ["sapso", "cma", "random"])
-def test_an_optimiser_goes_on_as_if_nothing_had_been(
+def test_an_optimiser_continues_as_if_never_interrupted(
     method: str, tmp_path: Path
 ) -> None:
     check_same(method, (2, 3), tmp_path)

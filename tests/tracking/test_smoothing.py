@@ -140,9 +140,7 @@ def test_angles_that_one_camera_sees_are_filtered_over_a_thirtieth_of_a_second()
         )
 
 
-def test_depth_counts_much_where_several_cameras_see_and_little_where_one_does() -> (
-    None
-):
+def test_depth_has_a_high_weight_with_several_cameras_and_a_low_one_with_one() -> None:
     # one camera, then several: a person who comes in is 10 cm too far at first, and then in place
     motion = walk()
     alone = 15

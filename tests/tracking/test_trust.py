@@ -50,7 +50,7 @@ def test_the_longer_side_of_a_mask_is_that_of_its_bounding_box() -> None:
     assert longer_side(mask) == 0
 
 
-def test_depth_scatters_by_what_no_smooth_path_explains() -> None:
+def test_depth_scatter_is_the_deviation_from_a_smooth_path() -> None:
     time = np.arange(60) / 30.0
     assert depth_scatter(8.0 - 1.2 * time + 0.3 * time**2, ALL, 30.0) == pytest.approx(
         0.0, abs=1e-9
@@ -143,8 +143,14 @@ def test_a_body_covers_half_of_what_moves() -> None:
             "do not use: the person seems to be 2.70 m tall, not 1.80 m",
         ),
         ({"depth_scatter": 0.3}, "do not use: the distance jumps by 30%"),
-        ({"foot_share": 0.1}, "doubtful: a foot stands in only 10% of the frames"),
-        ({"stance_spread_m": 0.3}, "doubtful: feet stand at heights 0.30 m apart"),
+        (
+            {"foot_share": 0.1},
+            "doubtful: a foot is on the ground in only 10% of the frames",
+        ),
+        (
+            {"stance_spread_m": 0.3},
+            "doubtful: feet touch the ground at heights 0.30 m apart",
+        ),
         ({"explained": 0.35}, "do not use: the body covers only 35% of what moves"),
         ({"acceleration": 30.0}, "doubtful: joints jerk, by 30 m/s2"),
         ({"frames": 2}, "doubtful: only 2 frames to judge the person by"),
@@ -326,7 +332,7 @@ def test_depth_is_that_of_the_track_before_it_was_smoothed() -> None:
     assert "the distance jumps by 1" in trust.sentence
 
 
-def test_the_sentence_stands_on_top_of_every_output_where_the_truth_is_unknown(
+def test_the_verdict_is_on_top_of_every_output_if_the_truth_is_unknown(
     tmp_path: Path,
 ) -> None:
     scene = walk(3)

@@ -51,7 +51,10 @@ def processor() -> dict[str, str]:
     from numba.core.registry import cpu_target
 
     listed = Path("/proc/cpuinfo")
-    lines = listed.read_text().splitlines() if listed.exists() else []
+    if listed.exists():
+        lines = listed.read_text().splitlines()
+    else:
+        lines = []
     name = platform.processor() or platform.machine()
     for line in lines:
         if line.startswith("model name"):

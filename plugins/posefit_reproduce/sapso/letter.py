@@ -62,7 +62,9 @@ class LetterSAPSO(SAPSO):
 
         The array is empty once the iterations or the temperature are used up.
         """
-        return super().ask() if self.c < self.C else self.moved[:0].copy()
+        if self.c < self.C:
+            return super().ask()
+        return self.moved[:0].copy()
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Accept or refuse moves by their costs (N,), cool, update the bests, move."""
