@@ -12,9 +12,15 @@ the tracker as it is, as a geometric mean, with the 95 % interval for other clip
 seeds; and the median ratio of CPU times. A change that makes no difference in any
 column shows that its mechanism can go. Finished tracks are kept in a file, where the
 same command continues.
+
+To see what another cost model does, track before and after it, and compare:
+
+    ablate.py --only "as it is" --ledger before.jsonl
+    ablate.py --only "as it is" --ledger after.jsonl --against before.jsonl
 """
 
 import importlib
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -29,8 +35,11 @@ from clips import (
     CHANGES,
     EVALUATIONS,
     GROUPS,
+    METHOD,
     PAIRS,
+    RUNS,
     SIDES,
+    WALKS,
     Clip,
     Views,
     cell_fields,
@@ -39,10 +48,15 @@ from clips import (
 )
 from posefit.arrays import Array
 from posefit.cli.output import Command
+from posefit.errors import InputError
 from posefit.footage.scene import Scene
+from posefit.settings import settings_of
 from posefit.statistics.means import mean_interval
 from posefit.sweep.cell import cell_scene
 from posefit.sweep.check import cell_of
+from posefit.tracking.result import Track
+from posefit.version import posefit_build, source_digest
+from posefit_exemplars.tracker import ExemplarTracker
 from table import WORKERS, Row, earlier, keyed, markdown, measured
 
 PACKAGE = "posefit_exemplars"
@@ -52,6 +66,7 @@ MODULES = (
     "exemplars",
     "fits",
     "frame_costs",
+    "hypotheses",
     "kernels",
     "lookup",
     "markov",
@@ -62,33 +77,55 @@ MODULES = (
 )
 CELL = "cell"  # a change of `cell.FIELD` is one of the cell's fields
 AS_IT_IS = "as it is"
-# Constants that are no choice of their own: they follow from others, fix the layout of
-# arrays, or are in arrays that are learned once and kept on disk.
-FIXED = (
-    "COARSE_GROUPS",
-    "CONTINUED_EVALUATIONS",
-    "DIMENSIONS",
-    "DISTANCE",
-    "ELEVATION",
-    "FIELD_OF_VIEW",
-    "FIRST_DIMENSIONS",
-    "FRESH_EVALUATIONS",
-    "GROUPS",
-    "LANES",
-    "LIMB_EVALUATIONS",
-    "MIN_EVALUATIONS",
-    "MIN_FIT_EVALUATIONS",
-    "MIN_FRAME_DISTANCE",
-    "MIN_SMALL_SIDE",
-    "PICTURE",
-    "POSES",
-    "RNG_STREAM_TABLE",
-    "SIDE",
-    "STEP_EVALUATIONS",
-    "TOTAL_BINS",
-    "YAWS",
-    "YAW_STEP",
-)
+# Constants that are not halved and doubled, by the reason.
+FIXED: Mapping[str, Sequence[str]] = {
+    "they follow from other constants": (
+        "CONTINUED_EVALUATIONS",
+        "FRESH_EVALUATIONS",
+        "LIMB_EVALUATIONS",
+        "MIN_EVALUATIONS",
+        "MIN_FIT_EVALUATIONS",
+        "YAW_STEP",
+    ),
+    "they lay out arrays, and change rounding at most": (
+        "ANGLES",
+        "FIRST_DIMENSIONS",
+        "LANES",
+        "TOTAL_BINS",
+    ),
+    "they keep numbers finite": ("MAX_KERNEL_COST",),
+    "they name a stream of random numbers": ("RNG_STREAM_TABLE",),
+    "arrays on disk are learned with them": (
+        "COARSE_GROUPS",
+        "DIMENSIONS",
+        "DISTANCE",
+        "ELEVATION",
+        "FIELD_OF_VIEW",
+        "GROUPS",
+        "MIN_FRAME_DISTANCE",
+        "PICTURE",
+        "POSES",
+        "SIDE",
+        "YAWS",
+    ),
+    "they change the posterior, not the pose: see posterior.py": (
+        "MODE_DISTANCE",
+        "POSTERIOR_TEMPERATURE",
+    ),
+    "only other methods use them: see starts.py": (
+        "CANDIDATES",
+        "COSTS_SHARE",
+        "MAX_DISTANCE",
+        "TEMPERATURE",
+    ),
+    "other fits use them, too: see follow.py": ("ROBUST_SCALES", "STEP_EVALUATIONS"),
+    "these tracks have no later passes, known yaws or spins": (
+        "FAST_TURN_COST",
+        "LIMB_POSES",
+        "LIMB_ROUNDS",
+        "WRONG_YAW_COST",
+    ),
+}
 OFF = 1e9  # of a spread or a cost: so large that what depends on it says nothing
 TINY = 1e-9  # of a share or a cost
 FRAMES = 24  # of a clip, at most
@@ -103,27 +140,28 @@ MECHANISMS: Mapping[str, Change] = {
     "poses of clips pull no hypothesis": {"fits.LIBRARY_TURN": OFF},
     "distance from clips costs nothing": {"cost_model.LIBRARY_COST": 0.0},
     "no diverse states": {"beam.BEAM_SHARES": 1},
-    "parts continue at their speed alone": {"cost_model.SPEED_COSTS": {1.0: 0.0}},
-    "no limit to the cost of a part's step": {"cost_model.MAX_PART_COST": OFF},
-    "noise raises no limit": {"cost_model.MAX_JUMP_FACTOR": 1.0},
     "masks are never taken for noisy": {"cost_model.CLEAN_COST": OFF},
-    "no candidates that turn away": {"proposals.CANDIDATE_TURN": TINY},
+    "no candidates that turn away": {"proposals.CANDIDATE_TURNS": (0.0,)},
     "roots may be anywhere": {
         "cost_model.ROOT_SPREAD": OFF,
         "cost_model.DEPTH_SPREAD": OFF,
     },
-    "a known root says nothing of clips": {"cost_model.KNOWN_ROOT_SPREAD": OFF},
     "no search everywhere after the first frame": {"path.SEARCHES_PER_SECOND": TINY},
     "no jumps": {"cost_model.JUMP_COST": 1e4},
-    "near hypotheses are not one": {"proposals.SAME_DISTANCE": 1e-4},
+    "near hypotheses are not one": {"hypotheses.SAME_DISTANCE": 1e-4},
     "the beam has all evaluations but a fit": {"tracker.FIT_SHARE": 0.3},
     "the path's costs count as much": {"cost_model.SHARPNESS": 1.0},
     "no smoothing over time": {"smoothing.FILTER_REACH": 0.0},
-    "half as many states": {"proposals.BEAM_STATES": 200},
+    "half as many states": {"proposals.BEAM_STATES": 100},
     "half as many searches everywhere": {"path.SEARCHES_PER_SECOND": 5.0},
     "only the nearest group is searched": {"exemplars.NEAR_GROUPS": 1},
     "half of the evaluations": {f"{CELL}.evaluations": EVALUATIONS // 2},
 }
+
+
+# The groups in the order in which their clips are tracked: most changes show first in
+# turns and dances.
+ORDER = ("turns", "dances", WALKS, "everyday", "jumps", RUNS)
 
 
 class Situation(NamedTuple):
@@ -132,12 +170,14 @@ class Situation(NamedTuple):
     views: Views
     every: int  # one of so many tracks has them
     fields: Mapping[str, Any]  # of the cell
+    frames: int = FRAMES  # of a clip, at most
 
 
 SITUATIONS: Mapping[str, Situation] = {
     "one camera": Situation(SIDES[1], 1, {}),
     "two cameras": Situation(PAIRS[1], 2, {}),
     "one camera, all worse": Situation(SIDES[1], 2, CHANGES["all of these"]),
+    "one picture": Situation(SIDES[1], 1, {}, frames=1),
 }
 
 
@@ -150,23 +190,48 @@ class Run(NamedTuple):
 
 
 def constants() -> dict[str, Change]:
-    """Return each numeric constant of the tracker halved, and doubled."""
-    owners: dict[str, tuple[str, float]] = {}
+    """Return each numeric constant and setting of the tracker halved, and doubled."""
+    fixed = {name for names in FIXED.values() for name in names}
+    owners: dict[str, tuple[str, Any]] = {}
     for module in MODULES:
         for name, value in vars(importlib.import_module(f"{PACKAGE}.{module}")).items():
-            is_number = isinstance(value, int | float) and not isinstance(value, bool)
-            if name.isupper() and is_number and value != 0 and name not in FIXED:
-                # one imported from another module is changed with that one
-                owners.setdefault(name, (module, value))
+            if not name.isupper() or name in fixed or not scaled(name, value, 2.0):
+                continue
+            # one imported from another module is changed with that one
+            if owners.get(name, (module, value))[1] is not value:
+                owners[f"{module}.{name}"] = module, value
+            owners.setdefault(name, (module, value))
     changes: dict[str, Change] = {}
-    for name, (module, value) in owners.items():
-        for factor in (0.5, 2.0):
-            changed: float = value * factor
-            if isinstance(value, int):
-                changed = round(changed)
-            if changed not in (value, 0):
-                changes[f"{name} = {changed:.3g}"] = {f"{module}.{name}": changed}
+    for factor, word in ((0.5, "halved"), (2.0, "doubled")):
+        for name, (module, value) in owners.items():
+            other = scaled(name, value, factor)
+            if other != value:
+                place = f"{module}.{name.rpartition('.')[2]}"
+                changes[f"{name} {word}"] = {place: other}
+        for setting in settings_of(ExemplarTracker):
+            other = scaled(setting.name, setting.default, factor)
+            settings = {f"{METHOD}.{setting.name}": other}
+            changes[f"{setting.name} {word}"] = {f"{CELL}.settings": settings}
     return changes
+
+
+def scaled(name: str, value: Any, factor: float) -> Any:
+    """Return a number, or all numbers of a constant, times a factor; None for others.
+
+    A share that would exceed 1 becomes half of the rest larger.
+    """
+    if isinstance(value, Mapping):
+        members = {key: scaled(name, one, factor) for key, one in value.items()}
+        return None if None in members.values() else members
+    if isinstance(value, tuple):
+        scaled_members = tuple(scaled(name, one, factor) for one in value)
+        return None if None in scaled_members else scaled_members
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    if name.endswith("_SHARE") and factor * value >= 1.0:
+        return 0.5 * (1.0 + value)
+    product = value * factor
+    return max(round(product), 1) if isinstance(value, int) else product
 
 
 @contextmanager
@@ -197,7 +262,7 @@ def tracked(run: Run, change: Change) -> dict[str, Any]:
     # no track's CPU time contains the learning of its library
     learn_library(clip, situation.views)
     fields = cell_fields(
-        clip, situation.views, FRAMES, seed=run.number, **situation.fields
+        clip, situation.views, situation.frames, seed=run.number, **situation.fields
     )
     for place, value in change.items():
         owner, _, name = place.partition(".")
@@ -213,11 +278,21 @@ def tracked(run: Run, change: Change) -> dict[str, Any]:
         seconds = time.process_time() - began
     return {
         **run._asdict(),
+        "build": build(),
         "clip": clip.name,
         "mpjpe_mm": track.measures.mpjpe_mm,
+        "root_mm": root_error(track, scene),
         "lost": track.measures.lost_rate,
         "cpu_ms": 1e3 * seconds / cell.frames,
     }
+
+
+def root_error(track: Track, scene: Scene) -> float:
+    """Return the mean distance of the root from the true one, in mm."""
+    assert scene.truth is not None
+    places = np.array([frame.translation for frame in track.frames])
+    distances = np.linalg.norm(places - scene.truth.translations, axis=1)
+    return 1e3 * float(distances.mean())
 
 
 def true_pose(scene: Scene, _training: Array, frame: int, *_: Any) -> Array:
@@ -229,19 +304,18 @@ def true_pose(scene: Scene, _training: Array, frame: int, *_: Any) -> Array:
 
 def clip_of(number: int) -> Clip:
     """Return a clip: of each group in turn, and of each group another every time."""
-    groups = list(GROUPS.values())
-    group = groups[number % len(groups)]
-    return group[number // len(groups) % len(group)]
+    group = GROUPS[ORDER[number % len(ORDER)]]
+    return group[number // len(ORDER) % len(group)]
 
 
 def jobs_of(
-    changes: Mapping[str, Change], tracks: int
+    changes: Mapping[str, Change], tracks: int, situations: Sequence[str]
 ) -> dict[Run, Callable[[], dict[str, Any]]]:
     """Return the tracks that are compared, by what they are of."""
     jobs: dict[Run, Callable[[], dict[str, Any]]] = {}
     for number in range(tracks):
-        for name, situation in SITUATIONS.items():
-            if number % situation.every:
+        for name in situations:
+            if number % SITUATIONS[name].every:
                 continue
             for change in changes:
                 run = Run(change, name, number)
@@ -254,48 +328,84 @@ def finished(path: str | None) -> dict[Run, Row]:
     return earlier(path, keyed(Run))
 
 
-def lines(results: Mapping[Run, Row], changes: Sequence[str]) -> Iterator[str]:
+def build() -> str:
+    """Return a name for this state of the sources of posefit and of the tracker."""
+    return f"{posefit_build()} {source_digest(PACKAGE)}"
+
+
+def check_build(path: str) -> None:
+    """Raise InputError if a file has tracks of other sources."""
+    for row in finished(path).values():
+        if row.get("build") != build():
+            raise InputError(
+                f"{path} has tracks of other sources: name a new file, "
+                f"and compare both with --against {path}"
+            )
+
+
+def lines(
+    results: Mapping[Run, Row],
+    changes: Sequence[str],
+    before: Mapping[Run, Row] | None = None,
+    figure: str = "mpjpe_mm",
+) -> Iterator[str]:
     """Yield a table with a line for each change.
 
     An unfinished track is left out, as are the tracks that would be compared with it.
+
+    Args:
+        results: The tracks of this tracker.
+        changes: The names of the changes.
+        before: The tracks that each change is compared with, which may be of another
+            tracker; by default those of this tracker as it is.
+        figure: The error that is compared.
+
     """
     heads = ["change"]
     for name in SITUATIONS:
         heads += [f"{name}: % more", "95 % interval", "tracks"]
     heads.append("CPU")
-    table = []
+    usual = {}
+    for run, row in (results if before is None else before).items():
+        if run.change == AS_IT_IS:
+            usual[run] = row
+    table = [_usual_line("before" if before else AS_IT_IS, usual, figure)]
     for change in changes:
+        if change == AS_IT_IS and before is None:
+            continue
         line = [change]
         cpu = list[float]()
         for name in SITUATIONS:
-            pairs = [
-                (row, results[run._replace(change=AS_IT_IS)])
-                for run, row in results.items()
-                if run.change == change
-                and run.situation == name
-                and run._replace(change=AS_IT_IS) in results
-            ]
-            if not pairs:
-                line += ["-", "", "0"]
-                continue
-            errors = np.array(
-                [[row["mpjpe_mm"] for row in pair] for pair in pairs]
-            )  # (tracks, 2)
-            cpu += [row["cpu_ms"] / usual["cpu_ms"] for row, usual in pairs]
-            if change == AS_IT_IS:
-                middle = float(np.exp(np.log(errors[:, 1]).mean()))
-                line += [f"{middle:.1f} mm", "", str(len(pairs))]
-                continue
-            line += [*_more(np.log(errors[:, 0] / errors[:, 1])), str(len(pairs))]
+            logs = list[float]()
+            for run, row in results.items():
+                other = usual.get(run._replace(change=AS_IT_IS))
+                if run.change == change and run.situation == name and other:
+                    logs.append(math.log(row[figure] / other[figure]))
+                    cpu.append(row["cpu_ms"] / other["cpu_ms"])
+            line += [*_more(np.array(logs)), str(len(logs))]
         table.append([*line, f"{np.median(cpu):.2f}" if cpu else "-"])
     yield from markdown(heads, table)
+
+
+def _usual_line(name: str, usual: Mapping[Run, Row], figure: str) -> list[str]:
+    """Return the line of the tracks that others are compared with: mean errors."""
+    line = [name]
+    for situation in SITUATIONS:
+        errors = [
+            row[figure] for run, row in usual.items() if run.situation == situation
+        ]
+        middle = f"{np.exp(np.log(errors).mean()):.1f} mm" if errors else "-"
+        line += [middle, "", str(len(errors))]
+    return [*line, "1.00"]
 
 
 def _more(logs: Array) -> list[str]:
     """Return how much larger errors are, in percent, from logarithms of ratios (n,)."""
     count = len(logs)
-    if count < 2:
-        return [f"{_percent(float(logs.mean()))}", ""]
+    if not count:
+        return ["-", ""]
+    if count == 1:
+        return [_percent(float(logs[0])), ""]
     mean = mean_interval(logs, np.zeros(count), np.arange(count))
     return [_percent(mean.value), f"{_percent(mean.low)} to {_percent(mean.high)}"]
 
@@ -308,12 +418,32 @@ def _percent(log: float) -> str:
 @click.option(
     "--constants", "of_constants", is_flag=True, help="Halve and double constants."
 )
-@click.option("--tracks", type=click.IntRange(2), default=24, show_default=True)
+@click.option("--tracks", type=click.IntRange(1), default=24, show_default=True)
 @click.option(
     "--only", multiple=True, metavar="TEXT", help="Changes whose name holds this."
 )
 @click.option(
+    "--situation",
+    "situations",
+    type=click.Choice(list(SITUATIONS)),
+    multiple=True,
+    default=tuple(SITUATIONS),
+    help="Conditions of the tracks; by default all.",
+)
+@click.option(
     "--ledger", metavar="FILE", help="Finished tracks: the same command continues."
+)
+@click.option(
+    "--against",
+    metavar="FILE",
+    help="The ledger of another tracker, with which all changes are compared.",
+)
+@click.option(
+    "--figure",
+    type=click.Choice(["mpjpe_mm", "root_mm"]),
+    default="mpjpe_mm",
+    show_default=True,
+    help="The error that is compared.",
 )
 @click.option("--print", "only_print", is_flag=True, help="Run nothing further.")
 @WORKERS
@@ -321,7 +451,10 @@ def main(
     of_constants: bool,
     tracks: int,
     only: tuple[str, ...],
+    situations: tuple[str, ...],
     ledger: str | None,
+    against: str | None,
+    figure: str,
     only_print: bool,
     workers: int | None,
 ) -> None:
@@ -334,8 +467,13 @@ def main(
     if only_print:
         results = finished(ledger)
     else:
-        results = measured(jobs_of(changes, tracks), ledger, keyed(Run), workers)
-    for line in lines(results, list(changes)):
+        if ledger:
+            check_build(ledger)
+        results = measured(
+            jobs_of(changes, tracks, situations), ledger, keyed(Run), workers
+        )
+    before = finished(against) if against else None
+    for line in lines(results, list(changes), before, figure):
         click.echo(line)
 
 

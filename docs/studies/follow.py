@@ -19,9 +19,8 @@ from posefit.motion import recorded
 from posefit.registry import registry
 from posefit.tracking.initialise import task_of
 from posefit.tracking.options import TrackOptions
-from posefit_exemplars.fits import KNOWN_SHIFT, START_TURN
+from posefit_exemplars.fits import CONTINUED_REACHES, KNOWN_SHIFT, START_TURN
 from posefit_exemplars.frame_costs import FrameCosts
-from posefit_exemplars.proposals import CONTINUED_REACHES
 
 # 27 seconds, which are played forwards and backwards as often as needed
 CLIP = "14_13"

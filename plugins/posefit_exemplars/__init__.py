@@ -23,6 +23,7 @@ To change what makes a track likely, change `cost_model`; to change what is trie
 - `exemplars`: the poses, how each clip continues, and codes that compare poses.
 - `beam`: states of a frame, and the best and most diverse of them.
 - `hypotheses`: hypotheses of a frame, and their motion.
+- `estimate`: the estimate of a frame, which each stage passes to the next.
 - `smoothing`: the filter of the estimates over time.
 - `calibration`: the reported frame and its calibrated posterior.
 - `lost_model`: the probability that a frame is lost.

@@ -10,7 +10,8 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit_exemplars import kernels
-from posefit_exemplars.exemplars import Exemplars, Rows
+from posefit_exemplars.exemplars import Exemplars
+from posefit_exemplars.kernels import Rows
 
 # Yaw bins in a full turn. States with the same pose and the same bin count as one.
 YAW_BINS = 36

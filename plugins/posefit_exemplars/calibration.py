@@ -19,8 +19,8 @@ from posefit.fitting.weights import logistic
 from posefit.geometry.skeleton import Skeleton
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
+from posefit_exemplars.estimate import Estimate
 from posefit_exemplars.frame_costs import FrameCosts
-from posefit_exemplars.smoothing import Estimate
 
 # Below these the logarithms of cost and spread no longer fall.
 MIN_COST = 0.1  # per cent

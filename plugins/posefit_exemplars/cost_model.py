@@ -15,7 +15,6 @@ measured by docs/studies/ablate.py.
 
 import math
 from collections import deque
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Self
 
@@ -24,11 +23,13 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.tracker import Task
 from posefit.geometry.rotation import wrapped
-from posefit.geometry.skeleton import JOINTS, LIMBS
+from posefit.geometry.skeleton import JOINTS
 from posefit_exemplars.beam import Beam
-from posefit_exemplars.exemplars import Codes, Exemplars, Rows, about_vertical
+from posefit_exemplars.exemplars import Exemplars, about_vertical
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import Hypotheses
+from posefit_exemplars.kernels import Codes
+from posefit_exemplars.lookup import YAW_TOLERANCE
 
 # The path's costs.
 
@@ -40,10 +41,7 @@ ROOT_SPREAD = 0.01
 # Metres, the same along the line of sight of a single camera. It is larger because one
 # silhouette says little about the distance from the camera.
 DEPTH_SPREAD = 0.03
-# Metres between a known root and where its clip continues, for a thirtieth of a second.
-KNOWN_ROOT_SPREAD = 0.008
 FAST_TURN_COST = 100.0  # cost of each radian beyond the fastest possible turn
-YAW_TOLERANCE = np.radians(45.0)  # of a known yaw, to either side
 # Cost, over the temperature, of a yaw off by twice the tolerance or more, for a
 # thirtieth of a second.
 WRONG_YAW_COST = 4.0
@@ -58,14 +56,6 @@ LIBRARY_DISTANCE = 0.05  # metres
 LIBRARY_COST = 4.0  # for a thirtieth of a second
 # The same in the only frame of a track, where hypotheses are fitted longer.
 ALONE_LIBRARY_COST = 1.0
-_LIMBS = [np.array([JOINTS.index(bone) for bone in bones]) for bones in LIMBS.values()]
-_TRUNK = np.setdiff1d(np.arange(len(JOINTS)), np.concatenate(_LIMBS))
-PARTS: Sequence[Rows] = [_TRUNK, *_LIMBS]  # the joints of each part
-# Costs of the speeds at which a part may continue, as multiples of its speed before.
-SPEED_COSTS: Mapping[float, float] = {0.0: 0.3, 0.5: 0.1, 1.0: 0.0, 1.4: 0.15}
-MAX_PART_COST = 4.0  # cost of a step of one part, at most, between clean masks
-# Noisy masks multiply it by the square of their noise, at most by this.
-MAX_JUMP_FACTOR = 3.0
 # The cost of a pose fitted to clean masks. If even the best frames cost more, masks or
 # the body are less precise.
 CLEAN_COST = 3.0
@@ -91,25 +81,17 @@ class Step(NamedTuple):
     # metres, root mean square over joints, between a pose and where its clip continues
     pose: float
     turn: float = TURN_SPREAD
-    known_root: float = KNOWN_ROOT_SPREAD
     max_turn: float = math.inf  # radians: the fastest possible turn
 
     @classmethod
     def of(cls, task: Task, spread: float) -> Self:
         """Return the step of a task; `spread` is for a thirtieth of a second."""
         seconds = (-1.0 if task.backwards else 1.0) / task.fps
-        intervals = 30.0 / task.fps
         max_turn = math.inf
         if task.fastest_turn is not None:
             max_turn = task.fastest_turn / task.fps
-        slack = math.sqrt(intervals)
-        return cls(
-            seconds,
-            spread * slack,
-            TURN_SPREAD * slack,
-            KNOWN_ROOT_SPREAD * intervals,
-            max_turn,
-        )
+        slack = math.sqrt(30.0 / task.fps)
+        return cls(seconds, spread * slack, TURN_SPREAD * slack, max_turn)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,34 +100,25 @@ class ClipSteps:
 
     beam: Beam
     step: Step
-    root: Array | None  # (3,) metres, in the next frame, or None if it is unknown
     # where the clips of the n states continue
     codes: Codes  # (n, D)
     yaws: Array  # (n,)
     places: Array  # (n, 3)
-    root_costs: Array  # (n,) of missing the known root
 
     @classmethod
-    def of(
-        cls, exemplars: Exemplars, beam: Beam, step: Step, root: Array | None = None
-    ) -> Self:
-        """Return where clips are a step later, and the costs of missing a known root.
-
-        If the root is known, its distance d from where the clip leads costs
-        log(1 + d^2 / 2 / spread^2). This grows slowly with d, because a person may be
-        faster than all clips.
-        """
+    def of(cls, exemplars: Exemplars, beam: Beam, step: Step) -> Self:
+        """Return where the clips of a beam's states are a step later."""
         codes, turns, displacements = exemplars.continuation(beam.states, step.seconds)
         places = beam.places + about_vertical(displacements, beam.yaws)
-        costs = np.zeros(len(beam))
-        if root is not None:
-            squares = ((places - root) ** 2).sum(axis=1) / (2.0 * step.known_root**2)
-            # if the root leaps away, steps must still cost less than a jump
-            costs = np.minimum(np.log1p(squares), 0.5 * JUMP_COST)
-        return cls(beam, step, root, codes, beam.yaws + turns, places, costs)
+        return cls(beam, step, codes, beam.yaws + turns, places)
 
     def costs(
-        self, exemplars: Exemplars, after: Beam, camera: Array | None = None
+        self,
+        exemplars: Exemplars,
+        after: Beam,
+        camera: Array | None = None,
+        *,
+        aligned: bool = True,
     ) -> Array:
         """Return the costs (n, m) of steps to the states of the next frame.
 
@@ -158,26 +131,28 @@ class ClipSteps:
             exemplars: The poses of the clips.
             after: The m states of the next frame.
             camera: (3,) metres, the position of the only camera, or None for several.
+            aligned: Whether the roots of the states are aligned. Those that are known
+                cost nothing.
 
         """
         step = self.step
         codes = exemplars.codes[after.states]
         squares = squared_distances(self.codes, codes)
         # TOYAMA2001 (dynamics)
-        costs: Array = squares / (2.0 * step.pose**2) + self.root_costs[:, None]
+        pose_costs = squares / np.float32(2.0 * step.pose**2)
         # Most steps cost more than a jump by their poses alone, and need no more. Flat
         # indices of the others take a tenth of the time of a mask.
-        near = np.flatnonzero(costs < JUMP_COST)
+        near = np.flatnonzero(pose_costs < JUMP_COST)
         rows, columns = np.divmod(near, len(after))
         turns = wrapped(after.yaws[columns] - self.yaws[rows])
-        cheap = costs.take(near) + 0.5 * (turns / step.turn) ** 2
-        if self.root is None:
+        cheap = pose_costs.take(near) + 0.5 * (turns / step.turn) ** 2
+        if aligned:
             missed = after.places.take(columns, 0) - self.places.take(rows, 0)
             sights = lines_of_sight(after.places, camera)
             if sights is not None:
                 sights = sights.take(columns, 0)
             cheap += root_deviation_costs(missed, sights)
-        costs = np.full(costs.shape, JUMP_COST)
+        costs = np.full(pose_costs.shape, JUMP_COST)
         costs.ravel()[near] = np.minimum(cheap, JUMP_COST)
         if step.max_turn < np.pi:
             turned = np.abs(wrapped(after.yaws - self.beam.yaws[:, None]))
@@ -284,14 +259,13 @@ class HypothesisCosts:
         frame_costs: FrameCosts,
         before: Hypotheses,
         after: Hypotheses,
-        noise: float,
     ) -> Array:
         """Return the costs (n, m) of steps to the m hypotheses of a frame.
 
-        The distances of the trunk and of each limb from where their motion leads cost
-        something, and so does that of an unknown root.
+        The distances from where the motion of a hypothesis leads cost something: those
+        of its joints, and that of an unknown root.
         """
-        costs = part_step_costs(self._spread, max_part_cost(noise), before, after)
+        costs = motion_step_costs(self._spread, before, after)
         if frame_costs.root is None:
             expected = before.places + before.shifts
             sights = lines_of_sight(after.places, frame_costs.camera_position)
@@ -299,52 +273,33 @@ class HypothesisCosts:
         return costs
 
 
-def part_step_costs(
-    spread: float, limit: float, before: Hypotheses, after: Hypotheses
-) -> Array:
+def motion_step_costs(spread: float, before: Hypotheses, after: Hypotheses) -> Array:
     """Return the costs (n, m) of steps between hypotheses of successive frames.
 
-    A step costs the sum over the trunk and the limbs. The cost of a part is half the
-    sum of two squares: the distance of its joints from where the mean of both rates
-    leads, and the difference of the rates. Both are in spreads, root mean square over
-    all joints. A part takes the cheapest of a few speeds.
+    A cost is half the sum of two squares: the distance of the joints from where the
+    mean of both rates leads, and the difference of the rates. Both are in spreads, root
+    mean square over all joints.
 
     Args:
         spread: Standard deviation of a step, metres.
-        limit: The cost of one part, at most.
         before: The n hypotheses of one frame.
         after: The m hypotheses of the next frame.
 
     """
-    scale = 0.5 / (spread**2 * len(JOINTS))
-    total = np.zeros((len(before.joints), len(after.joints)))
-    for part in PARTS:
-        joints, rates, later, later_rates = (
-            array[:, part].reshape(len(array), -1).astype(np.float32)
-            for array in (before.joints, before.rates, after.joints, after.rates)
-        )
-        changes = squared_distances(rates, later_rates)
-        costs = np.full(changes.shape, limit)
-        for speed, cost in SPEED_COSTS.items():
-            half = np.float32(0.5 * speed)
-            # half a frame after the one and half a frame before the other
-            squares = squared_distances(
-                joints + half * rates, later - half * later_rates
-            )
-            speed_costs = scale * (squares + speed**2 * changes) + cost  # (n, m)
-            np.minimum(costs, speed_costs, out=costs)
-        total += costs
-    return total
+    # half a frame after the one and half a frame before the other
+    expected = before.joints + 0.5 * before.rates
+    found = after.joints - 0.5 * after.rates
+    # a distance of joints and rates in one vector is the sum of both squares
+    squares = squared_distances(
+        _motions(expected, before.rates), _motions(found, after.rates)
+    )
+    return np.asarray(squares / (2.0 * spread**2 * len(JOINTS)), dtype=np.float64)
 
 
-def max_part_cost(noise: float) -> float:
-    """Return the greatest cost of a step of one part, for masks with this noise.
-
-    A noise of 2 means masks half as precise as clean ones. With noisy masks a wrong
-    pose may fit some frames much better than the right one, and a jump to it must still
-    not pay.
-    """
-    return MAX_PART_COST * min(noise**2, MAX_JUMP_FACTOR)
+def _motions(joints: Array, rates: Array) -> Codes:
+    """Return joints (n, 27, 3) and rates (n, 27, 3) as vectors (n, 162)."""
+    both = np.concatenate([joints, rates], axis=1)
+    return both.reshape(len(both), -1).astype(np.float32)
 
 
 class MaskNoise:

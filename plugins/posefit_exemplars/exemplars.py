@@ -8,7 +8,6 @@ from operator import is_
 from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.arrays.compiling import state_of
@@ -21,10 +20,7 @@ from posefit.geometry.skeleton import JOINTS, Skeleton
 from posefit.motion.built_in import average_skeleton
 from posefit.motion.motion import Motion
 from posefit_exemplars import kernels
-
-# (n, D): the distance of two codes is that of the joints of their poses, rms, metres
-Codes = NDArray[np.float32]
-Rows = NDArray[np.int64]
+from posefit_exemplars.kernels import Codes, Rows
 
 # Metres: the least distance of two states of a clip, and of the centres of two groups.
 MIN_FRAME_DISTANCE = 0.02

@@ -13,22 +13,38 @@ from collections.abc import Callable
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.fitting.contours import MaskContours, contour_race, fitted, precisions
+from posefit.fitting.contours import (
+    ROBUST_SCALES,
+    STEP_EVALUATIONS,
+    MaskContours,
+    contour_race,
+    fitted,
+    precisions,
+)
 from posefit.fitting.tracker import Task
 from posefit_exemplars.exemplars import Exemplars
 from posefit_exemplars.frame_costs import FrameCosts
-from posefit_exemplars.proposals import CONTINUED_REACHES, FRESH_REACHES
+from posefit_exemplars.hypotheses import SAME_DISTANCE
 
+# Metres, for each step of a fit. Contours that are farther away count less.
+FRESH_REACHES = ROBUST_SCALES[:8]
+# The first step of a hypothesis that continues reaches farther, because a limb may have
+# left the way that it had.
+CONTINUED_REACHES = (0.15, *FRESH_REACHES[1::2])
+# The last evaluation is the cost of the fitted pose.
+FRESH_EVALUATIONS = len(FRESH_REACHES) * STEP_EVALUATIONS + 1.0
+# Two of the evaluations compare the places to start at.
+CONTINUED_EVALUATIONS = len(CONTINUED_REACHES) * STEP_EVALUATIONS + 3.0
 # Standard deviations of an angle from the start of a fit, and from similar clips.
-START_TURN = np.radians(8.0)
+START_TURN = np.radians(16.0)
 LIBRARY_TURN = np.radians(15.0)
 # Standard deviations of the root from its start, metres.
 KNOWN_SHIFT = 0.003
 ALIGNED_SHIFT = 0.05
 # The mean of the nearest poses of clips pulls a hypothesis that continues. A pose gets
-# less weight the farther it is away, compared to the nearest one.
+# less weight the farther it is away, compared to the nearest one: `SAME_DISTANCE` is
+# the standard deviation.
 SIMILAR_POSES = 8
-SIMILAR_SPREAD = 0.03  # metres, standard deviation of these weights
 
 PosesAndPlaces = tuple[Array, Array]  # (n, 66), and (n, 3) metres
 
@@ -42,6 +58,10 @@ class FrameFits:
         frame_costs: The costs of the frame.
         place: (3,) metres, about where the person is.
         noise: How many times less precise the masks are than clean ones.
+
+    Attributes:
+        evaluations: The evaluations of all fits so far, and of the costs of the fitted
+            poses.
 
     """
 
@@ -59,10 +79,14 @@ class FrameFits:
         self._contours: list[MaskContours] = frame_costs.contours(place)
         self._noise = noise
         shift = ALIGNED_SHIFT if frame_costs.root is None else KNOWN_SHIFT
-        self._weights = precisions(START_TURN / noise, shift)  # (69,)
+        # noisy masks say less, and so the start more: twice as much from the first on
+        turn = START_TURN / (2.0 * noise - 1.0)
+        self._weights = precisions(turn, shift)  # (69,)
+        self.evaluations = 0.0
 
     def fresh(self, start: PosesAndPlaces) -> PosesAndPlaces:
         """Return poses fitted from a start that is only near the person's pose."""
+        self.evaluations += len(start[0]) * FRESH_EVALUATIONS
         return fitted(
             self._task.body,
             self._contours,
@@ -73,21 +97,23 @@ class FrameFits:
             self._task.threads,
         )
 
-    def race(
+    def raced(
         self, start: PosesAndPlaces, costs: Callable[[Array, Array], Array]
-    ) -> tuple[Array, Array, int]:
-        """Return poses and places fitted in rounds, the cheapest ones longest.
+    ) -> PosesAndPlaces:
+        """Return poses fitted in rounds, the cheapest ones longest.
 
-        With them come the evaluations that this took. `costs` returns the costs (n,) of
-        poses at places.
+        `costs` returns the costs (n,) of poses at places.
         """
-        return contour_race(
+        poses, places, used = contour_race(
             self._task.body, self._contours, start, self._weights, costs
         )
+        self.evaluations += used + len(poses)
+        return poses, places
 
     def continued(self, start: PosesAndPlaces) -> PosesAndPlaces:
         """Return poses fitted from where hypotheses of the frame before lead."""
         poses, places = start
+        self.evaluations += len(poses) * CONTINUED_EVALUATIONS
         places = self._cheaper_places(poses, places)
         means, pulls = self._pulls(poses)
         return fitted(
@@ -103,10 +129,11 @@ class FrameFits:
     def _cheaper_places(self, poses: Array, places: Array) -> Array:
         """Return the cheaper place (n, 3) of each pose: its own or the aligned one.
 
-        A known root is returned as it is.
+        A known root leaves no choice, and saves two evaluations of each pose.
         """
         frame_costs = self._frame_costs
         if frame_costs.root is not None:
+            self.evaluations -= 2.0 * len(poses)
             return frame_costs.at_root(places)
         aligned = frame_costs.aligned(poses, places)
         cheaper = frame_costs.full(poses, aligned) < frame_costs.full(poses, places)
@@ -119,6 +146,6 @@ class FrameFits:
         """
         pulls = precisions(LIBRARY_TURN / self._noise, np.inf)
         pulls[3] = 0.0  # the yaws of clips are free
-        means = self._exemplars.nearby_mean(poses, SIMILAR_POSES, SIMILAR_SPREAD)
+        means = self._exemplars.nearby_mean(poses, SIMILAR_POSES, SAME_DISTANCE)
         sums = self._weights + pulls
         return poses + (pulls / sums)[3:] * (means - poses), sums

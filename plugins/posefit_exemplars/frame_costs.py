@@ -1,5 +1,7 @@
 """The costs of poses in one frame, at full size and in a small picture."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from posefit.arrays import Array
@@ -7,12 +9,21 @@ from posefit.fitting.contours import POINT_SPACING, MaskContours
 from posefit.fitting.cost import align
 from posefit.fitting.landmarks import GROUPS, landmark_likelihoods, side_odds
 from posefit.fitting.tracker import Observation, Task
+from posefit.geometry.camera import Camera
 from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
 from posefit.silhouette.cost import known_views, pose_costs
 from posefit.silhouette.mask import Areas, coarser_camera, coarser_silhouette
 
 MIN_SMALL_SIDE = 40  # pixels: no side of a small picture is shorter
-SMALL_FACTORS = (4, 2, 1)
+
+
+def small_factor(cameras: Sequence[Camera]) -> int:
+    """Return how many pixels across and down become one in a small picture."""
+    sides = [side for camera in cameras for side in (camera.width, camera.height)]
+    for factor in (4, 2):
+        if min(sides) >= factor * MIN_SMALL_SIDE:
+            return factor
+    return 1
 
 
 class FrameCosts:
@@ -29,12 +40,7 @@ class FrameCosts:
         self.alone = alone  # the only frame of a track
         self.observation = observation
         silhouettes = observation.silhouettes
-        side = min(
-            side for camera in task.cameras for side in (camera.width, camera.height)
-        )
-        factor = next(
-            (factor for factor in SMALL_FACTORS if side >= factor * MIN_SMALL_SIDE), 1
-        )
+        factor = small_factor(task.cameras)
         cameras = [coarser_camera(camera, factor) for camera in task.cameras]
         pictures = [
             coarser_silhouette(silhouette, factor) for silhouette in silhouettes

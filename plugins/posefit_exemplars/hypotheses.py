@@ -8,7 +8,21 @@ from posefit.arrays import Array
 from posefit.fitting.tracker import Task
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES, JOINTS, root_centred
-from posefit_exemplars.exemplars import Rows
+from posefit_exemplars.kernels import Rows
+
+# Metres, the standard deviation of the joints of poses that count as the same, with one
+# camera: see `same_distance`.
+SAME_DISTANCE = 0.03
+
+
+def same_distance(cameras: int) -> float:
+    """Return the distance, metres, at which hypotheses count as the same pose.
+
+    Nearer ones continue as one. It is also the standard deviation of the mean that is
+    reported. The more cameras show the person, the better they tell similar poses
+    apart.
+    """
+    return SAME_DISTANCE / cameras**2
 
 
 class Hypotheses(NamedTuple):

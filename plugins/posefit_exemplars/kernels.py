@@ -18,17 +18,18 @@ FIRST_DIMENSIONS = 6
 LANES = 32
 TOTAL_BINS = 256  # bins of the histogram of totals
 
+# (n, D): the distance of two codes is that of the joints of their poses, rms, metres
 Codes = NDArray[np.float32]
 Rows = NDArray[np.int64]
 
 
 @inlined
-def lower_distances(distances, start, code, tile, partial):
+def lower_distances(distances, code, tile, partial):
     """Lower `distances` (LANES,) to those of a tile's codes (DIMENSIONS, LANES).
 
-    A distance is `start` plus the squared distance of a code from `code`. Codes are
-    principal components: the first few show that all codes of most tiles are farther
-    away, and the others are then not compared. `partial` (LANES,) is a buffer.
+    These are squared distances from `code`. Codes are principal components: the first
+    few show that all codes of most tiles are farther away, and the others are then not
+    compared. `partial` (LANES,) is a buffer.
 
     Returns:
         Whether the first components left open that any distance is lower.
@@ -36,7 +37,7 @@ def lower_distances(distances, start, code, tile, partial):
     """
     near = False
     for lane in range(LANES):
-        total = start
+        total = np.float32(0.0)
         for d in range(FIRST_DIMENSIONS):
             difference = tile[d, lane] - code[d]
             total += difference * difference
@@ -91,9 +92,7 @@ def nearest_codes(codes, groups, tiles, count):
         for group in groups[i]:
             for t in range(tiles.starts[group], tiles.starts[group + 1]):
                 distances[:] = squares[i, last]
-                if not lower_distances(
-                    distances, np.float32(0.0), codes[i], tiles.codes[t], partial
-                ):
+                if not lower_distances(distances, codes[i], tiles.codes[t], partial):
                     continue
                 for lane in range(LANES):
                     rank = last
@@ -112,7 +111,6 @@ class Sources(NamedTuple):
 
     totals: Array  # (n,) the total of each state
     codes: Codes  # (n, D) where its clip continues
-    costs: Array  # (n,) of continuing there
     groups: Rows  # (n, g) the groups of poses that it can step to
 
 
@@ -185,12 +183,11 @@ def cheapest_steps(sources, rows, tiles, room, bounds):
         if total_before >= bound:
             continue
         farthest = np.float32((bound - total_before) / bounds.scale)
-        start = np.float32(sources.costs[row] / bounds.scale)
         for group in sources.groups[row]:
             for t in range(tiles.starts[group], tiles.starts[group + 1]):
                 distances[:] = farthest
                 if not lower_distances(
-                    distances, start, sources.codes[row], tiles.codes[t], partial
+                    distances, sources.codes[row], tiles.codes[t], partial
                 ):
                     continue
                 for lane in range(LANES):

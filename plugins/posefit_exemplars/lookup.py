@@ -29,8 +29,9 @@ from posefit.silhouette.cost import masks_of
 from posefit.silhouette.drawn import uncounted
 from posefit.silhouette.mask import Mask, Silhouette, box_of, without_small_pieces
 from posefit.uncertainty.modes import Posterior
-from posefit_exemplars.exemplars import Exemplars, Rows, exemplars_for
+from posefit_exemplars.exemplars import Exemplars, exemplars_for
 from posefit_exemplars.frame_costs import FrameCosts
+from posefit_exemplars.kernels import Rows
 
 POSES = 2000  # poses in a table, drawn by `Exemplars.draw`
 YAWS = 24  # yaws that each pose is turned to
@@ -48,7 +49,7 @@ TEMPERATURE = 4.0  # divides the costs of candidates
 # Nothing is suggested if the squared distance to the nearest code is larger. 99 % of
 # damaged silhouettes of unknown people are nearer.
 MAX_DISTANCE = 16.0
-YAW_TOLERANCE = np.radians(50.0)  # of a known yaw, to either side
+YAW_TOLERANCE = np.radians(45.0)  # of a known yaw, to either side
 RNG_STREAM_TABLE = 61
 Codes = NDArray[np.float32]  # (n, DIMENSIONS)
 

@@ -28,8 +28,9 @@ from posefit.geometry.symmetry import facing
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import second_side
 
-# Decay time of the mean of the landmarks' evidence of sides.
-LANDMARK_SECONDS = 0.5
+# Decay time of the mean of the landmarks' evidence of sides, and the time over which
+# the root's motion is measured.
+MOMENT_SECONDS = 0.5
 # Landmarks of one camera tell left from right if the mean logarithm of their odds is at
 # least this.
 MIN_SIDE_ODDS = 0.4
@@ -56,7 +57,6 @@ EVIDENCE: Mapping[str, Callable[[float], float]] = {
 DEFAULTS = {"reflected": 1.0, "mirrored": 1.0, "views": 1.0}
 MAX_VIEWS = 4  # the models were fitted with at most this many cameras
 MIRROR_COST_OFFSET = 1.0  # per cent, added to both costs of a ratio
-MOTION_SECONDS = 0.5  # the root's motion is measured over this time
 MAX_SPEED = 2.0  # metres a second; a higher speed is no better evidence
 # Names of the features: the evidence, then each of its means.
 NAMES = (
@@ -213,8 +213,8 @@ def with_failure_probabilities(
     """Yield frames with the probabilities of being lost and of exchanged sides."""
     means = EvidenceMeans(task.fps)
     side_sums = np.zeros(3)
-    decay = math.exp(-1.0 / (LANDMARK_SECONDS * task.fps))
-    places: deque[Array] = deque(maxlen=max(round(MOTION_SECONDS * task.fps), 1) + 1)
+    decay = math.exp(-1.0 / (MOMENT_SECONDS * task.fps))
+    places: deque[Array] = deque(maxlen=max(round(MOMENT_SECONDS * task.fps), 1) + 1)
     for frame in frames:
         assert frame.posterior is not None
         places.append(frame.translation)

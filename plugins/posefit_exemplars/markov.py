@@ -18,7 +18,7 @@ from posefit.arrays import Array
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton, joint_distances
 from posefit.uncertainty.modes import Posterior
-from posefit_exemplars.exemplars import Rows
+from posefit_exemplars.kernels import Rows
 
 # Metres, root mean square over joints. Samples nearer to the reported pose than this
 # belong to its mode.
@@ -30,42 +30,54 @@ MAX_KERNEL_COST = 80.0
 T = TypeVar("T")
 
 
-class FrameStates(NamedTuple):
-    """The costs, parents and weights of a frame's states, given the frames so far."""
+class LikeliestPaths(NamedTuple):
+    """The likeliest path to each of a frame's states, given the frames so far."""
 
-    totals: Array  # (n,) costs of the likeliest path to each
-    parents: Rows  # (n,) the previous state on that path, or -1
+    totals: Array  # (n,) costs of the paths, the least 0
+    parents: Rows  # (n,) the previous state on the path, or -1
+
+
+def likeliest_paths(
+    costs: Array, before: LikeliestPaths | None = None, steps: Array | None = None
+) -> LikeliestPaths:
+    """Return the likeliest paths to the states of a frame.
+
+    Args:
+        costs: (n,) the costs of the states.
+        before: The likeliest paths of the frame before, or None in the first frame.
+        steps: (m, n) the costs of the steps from each state before.
+
+    """
+    if before is None or steps is None:
+        return LikeliestPaths(costs - costs.min(), np.full(len(costs), -1))
+    paths = before.totals[:, None] + steps
+    parents = paths.argmin(axis=0)
+    totals = paths[parents, np.arange(len(costs))] + costs  # RABINER1989 (Viterbi)
+    return LikeliestPaths(totals - totals.min(), parents)
+
+
+class FrameStates(NamedTuple):
+    """The likeliest paths to a frame's states, and the weights of the states."""
+
+    paths: LikeliestPaths
     likelihoods: Array  # (n,) of the silhouettes, the greatest 1
     # (m, n) likelihoods of steps from the frame before
     kernel: NDArray[np.float32] | None
-    forward: Array  # (n,) weights, which sum to 1
+    forward: Array  # (n,) weights given the frames so far, which sum to 1
 
 
 def frame_states(
     costs: Array, before: FrameStates | None = None, steps: Array | None = None
 ) -> FrameStates:
-    """Return the states of a frame.
-
-    Args:
-        costs: (n,) the costs of the states.
-        before: The states of the frame before, or None in the first frame.
-        steps: (m, n) the costs of the steps from each state before.
-
-    """
+    """Return the states of a frame, with the arguments of `likeliest_paths`."""
     likelihoods = np.exp(costs.min() - costs)  # TOYAMA2001 (likelihood)
     if before is None or steps is None:
         forward = likelihoods / likelihoods.sum()
-        return FrameStates(
-            costs - costs.min(), np.full(len(costs), -1), likelihoods, None, forward
-        )
-    paths = before.totals[:, None] + steps
-    parents = paths.argmin(axis=0)
-    totals = paths[parents, np.arange(len(costs))] + costs  # RABINER1989 (Viterbi)
+        return FrameStates(likeliest_paths(costs), likelihoods, None, forward)
+    paths = likeliest_paths(costs, before.paths, steps)
     kernel = np.exp(-np.minimum(steps, MAX_KERNEL_COST)).astype(np.float32)
     forward = (before.forward @ kernel) * likelihoods  # RABINER1989 (forward)
-    return FrameStates(
-        totals - totals.min(), parents, likelihoods, kernel, forward / forward.sum()
-    )
+    return FrameStates(paths, likelihoods, kernel, forward / forward.sum())
 
 
 def windows(frames: Iterable[T], delay: int) -> Iterator[Sequence[T]]:
@@ -85,7 +97,7 @@ def windows(frames: Iterable[T], delay: int) -> Iterator[Sequence[T]]:
         waiting.popleft()
 
 
-def viterbi_state(window: Sequence[FrameStates]) -> int:
+def viterbi_state(window: Sequence[LikeliestPaths]) -> int:
     """Return the state of the first frame on the likeliest path to the last one."""
     row = int(window[-1].totals.argmin())
     for frame in window[:0:-1]:
@@ -98,7 +110,7 @@ def state_weights(window: Sequence[FrameStates]) -> Array:
 
     They sum to 1.
     """
-    backward = np.ones(len(window[-1].totals))
+    backward = np.ones(len(window[-1].likelihoods))
     for frame in window[:0:-1]:
         assert frame.kernel is not None
         # RABINER1989 (backward)
@@ -138,7 +150,7 @@ def backward_messages(window: Sequence[FrameStates], power: float) -> Array:
     It is determined up to a factor. The likelihoods of silhouettes are raised to
     `power`: below 1, the posterior is wider.
     """
-    backward = np.ones(len(window[-1].totals), dtype=np.float32)
+    backward = np.ones(len(window[-1].likelihoods), dtype=np.float32)
     for frame in window[:0:-1]:
         assert frame.kernel is not None
         likelihoods = backward * frame.likelihoods**power
@@ -174,7 +186,7 @@ def sample_states(
     paths, power = sampling
     weights = np.broadcast_to(
         first.likelihoods**power * backward_messages(window, power),
-        (paths, len(first.totals)),
+        (paths, len(first.likelihoods)),
     )
     if rows is not None and first.kernel is not None:
         weights = first.kernel[rows] * weights  # GODSILL2004 (step)

@@ -38,22 +38,20 @@ from posefit_exemplars.cost_model import (
     Step,
     yaw_costs,
 )
-from posefit_exemplars.exemplars import Exemplars, Rows
+from posefit_exemplars.estimate import Estimate
+from posefit_exemplars.exemplars import Exemplars
 from posefit_exemplars.fits import FrameFits
 from posefit_exemplars.frame_costs import FrameCosts
-from posefit_exemplars.hypotheses import Hypotheses
+from posefit_exemplars.hypotheses import Hypotheses, same_distance
+from posefit_exemplars.kernels import Rows
 from posefit_exemplars.proposals import (
     BEAM_STATES,
-    CONTINUED_EVALUATIONS,
-    FRESH_EVALUATIONS,
     LIMB_EVALUATIONS,
-    SAME_DISTANCE,
     HypothesisProposals,
     StateProposals,
     next_states,
     poses_of,
 )
-from posefit_exemplars.smoothing import Estimate
 
 FULL_SHARE = 0.6  # share of the path's evaluations for costs at full size
 # The path's evaluations per frame, at least, if several cameras leave less open.
@@ -62,10 +60,10 @@ SEARCHES_PER_SECOND = 10.0  # searches everywhere
 
 
 class _PathFrame(NamedTuple):
-    """The beam of a frame, the weights of its states, and its evaluations."""
+    """The beam of a frame, the likeliest paths to its states, and its evaluations."""
 
     beam: Beam
-    states: markov.FrameStates
+    paths: markov.LikeliestPaths
     frame_costs: FrameCosts
     evaluations: float
 
@@ -116,8 +114,7 @@ class ClipPath:
 
         """
         for window in markov.windows(self._frames(observations, rng), self._delay):
-            states = [frame.states for frame in window]
-            row = markov.viterbi_state(states)
+            row = markov.viterbi_state([frame.paths for frame in window])
             frame = window[0]
             count = hypotheses.counts(frame.frame_costs).diverse
             yield self._estimated(frame, row, count)
@@ -157,11 +154,11 @@ class ClipPath:
         if latest is None:
             proposed, used = self._proposals.first(frame_costs, small, rng)
             beam, costs, evaluations = self._best(frame_costs, proposed, full, used)
-            states = markov.frame_states(costs)
+            paths = markov.likeliest_paths(costs)
             return _PathFrame(
-                replace(beam, totals=states.totals), states, frame_costs, evaluations
+                replace(beam, totals=paths.totals), paths, frame_costs, evaluations
             )
-        steps = ClipSteps.of(self.exemplars, latest.beam, self._step, frame_costs.root)
+        steps = ClipSteps.of(self.exemplars, latest.beam, self._step)
         if frame_costs.usable:
             proposed, used = self._proposals.next(
                 frame_costs, steps, small, everywhere, rng
@@ -173,10 +170,15 @@ class ClipPath:
             beam = replace(beam, places=frame_costs.at_root(beam.places))
             costs = np.zeros(len(beam))
             evaluations = 0.0
-        step_costs = steps.costs(self.exemplars, beam, frame_costs.camera_position)
-        states = markov.frame_states(costs, latest.states, step_costs)
+        step_costs = steps.costs(
+            self.exemplars,
+            beam,
+            frame_costs.camera_position,
+            aligned=frame_costs.root is None,
+        )
+        paths = markov.likeliest_paths(costs, latest.paths, step_costs)
         return _PathFrame(
-            replace(beam, totals=states.totals), states, frame_costs, evaluations
+            replace(beam, totals=paths.totals), paths, frame_costs, evaluations
         )
 
     def _best(
@@ -198,12 +200,13 @@ class ClipPath:
 
         """
         turn_costs = yaw_costs(beam.yaws, frame_costs.yaw) * 30.0 / self._task.fps
-        small_costs = frame_costs.small(poses_of(self.exemplars, beam), beam.places)
+        poses = poses_of(self.exemplars, beam)
+        small_costs = frame_costs.small(poses, beam.places)
         totals = beam.totals + turn_costs + small_costs / self._temperature
         used += len(beam)
         rows = diverse_best(self.exemplars, beam, totals, full)
         beam = beam.rows(rows)
-        poses = poses_of(self.exemplars, beam)
+        poses = poses[rows]
         silhouette_costs = frame_costs.full(poses, beam.places) / self._temperature
         costs = (
             turn_costs[rows]
@@ -311,10 +314,11 @@ class HypothesisPath:
         for window in markov.windows(frames, self._delay):
             states = [frame.states for frame in window]
             estimate, hypotheses, *_ = window[0]
-            row = markov.viterbi_state(states)
+            row = markov.viterbi_state([one.paths for one in states])
             weights = markov.state_weights(states)
             poses = hypotheses.poses
-            squares = hypotheses.squares_from(row) / SAME_DISTANCE**2
+            reach = same_distance(estimate.frame_costs.camera_count)
+            squares = hypotheses.squares_from(row) / reach**2
             pose, place = markov.mean_near(
                 row, weights, squares, poses, hypotheses.places
             )
@@ -338,7 +342,7 @@ class HypothesisPath:
             if before is not None:
                 latest = before.hypotheses
                 rows = self.proposals.continuing(
-                    latest, before.states.totals, estimate.frame_costs
+                    latest, before.states.paths.totals, estimate.frame_costs
                 )
             fresh = self.proposals.fresh(estimate, latest, rows, rng)
             noise, evaluations = self._noise.of(estimate.frame_costs, *fresh)
@@ -374,26 +378,20 @@ class HypothesisPath:
             fits = FrameFits(
                 self._task, self._exemplars, frame_costs, estimate.place, noise
             )
-            if frame_costs.observation.estimate is not None:
-                evaluations += LIMB_EVALUATIONS
             if frame_costs.alone:
-                raced_poses, raced_places, used = fits.race(
+                fresh = fits.raced(
                     fresh,
                     lambda poses, places: self._costs.of_poses(
                         frame_costs, poses, places, noise
                     )[0],
                 )
-                fresh = raced_poses, raced_places
-                evaluations += used + len(fresh[0])
             else:
                 fresh = fits.fresh(fresh)
-                evaluations += len(fresh[0]) * FRESH_EVALUATIONS
-            evaluations += len(rows) * CONTINUED_EVALUATIONS
-            # a known root leaves no choice of places to start at
-            if frame_costs.root is not None:
-                evaluations -= 2.0 * len(rows)
             if len(rows):
                 continued = fits.continued(latest.continued(rows))
+            evaluations = fits.evaluations
+            if frame_costs.observation.estimate is not None:
+                evaluations += LIMB_EVALUATIONS
         poses, places = (
             np.concatenate(arrays) for arrays in zip(fresh, continued, strict=True)
         )
@@ -426,8 +424,8 @@ class HypothesisPath:
             self._noise.add(least)
         if before is None:
             return markov.frame_states(costs), exchanged_given(likelihoods, exchanged)
-        steps = self._costs.of_steps(frame_costs, before.hypotheses, hypotheses, noise)
+        steps = self._costs.of_steps(frame_costs, before.hypotheses, hypotheses)
         # what landmarks cost depends on which groups were exchanged before
         steps += landmarks - landmarks.min(axis=0)
         states = markov.frame_states(costs, before.states, steps)
-        return states, exchanged_given(likelihoods, exchanged[states.parents])
+        return states, exchanged_given(likelihoods, exchanged[states.paths.parents])

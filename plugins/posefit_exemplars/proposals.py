@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.fitting.contours import STEP_EVALUATIONS, race_count
+from posefit.fitting.contours import race_count
 from posefit.fitting.tracker import Task
 from posefit.geometry.skeleton import JOINTS, LIMBS, angles_of
 from posefit.geometry.symmetry import exchanged_limbs
@@ -20,45 +20,40 @@ from posefit_exemplars import kernels
 from posefit_exemplars.beam import Beam, diverse_best, joined, yaw_bins
 from posefit_exemplars.cost_model import (
     JUMP_COST,
-    YAW_TOLERANCE,
+    TURN_SPREAD,
     ClipSteps,
     lines_of_sight,
     root_deviation_costs,
     squared_distances,
 )
-from posefit_exemplars.exemplars import Exemplars, Rows
+from posefit_exemplars.estimate import Estimate
+from posefit_exemplars.exemplars import Exemplars
+from posefit_exemplars.fits import CONTINUED_EVALUATIONS, FRESH_EVALUATIONS
 from posefit_exemplars.frame_costs import FrameCosts
-from posefit_exemplars.hypotheses import Hypotheses
-from posefit_exemplars.lookup import YAW_STEP, Lookup
-from posefit_exemplars.smoothing import Estimate
+from posefit_exemplars.hypotheses import Hypotheses, same_distance
+from posefit_exemplars.kernels import Rows
+from posefit_exemplars.lookup import YAW_STEP, YAW_TOLERANCE, Lookup
 
-BEAM_STATES = 400  # states that a frame keeps
-# Each candidate is also tried with this turn away from its clip, to either side.
-CANDIDATE_TURN = np.radians(7.0)
+BEAM_STATES = 200  # states that a frame keeps
+# Each candidate is also tried turned away from its clip, to either side, by so many
+# standard deviations of turns.
+CANDIDATE_TURNS = (0.0, -2.0, 2.0)
 # Share of the proposed states for where clips continue. The others are for a search
 # everywhere.
 CONTINUED_SHARE = 0.25
-SEARCHED_GROUPS = 200  # best groups of a search everywhere, at most
-GROUP_POSES = 20  # poses of each such group that are evaluated, drawn at random
+# A search everywhere gives this share of its costs to poses that are similar to the
+# cheapest ones: so many of each one's group, drawn at random.
+SIMILAR_SHARE = 0.25
+GROUP_POSES = 20
 
-# Metres, for each step of a fit. Contours that are farther away count less.
-FRESH_REACHES = (0.09, 0.09, 0.065, 0.065, 0.045, 0.045, 0.033, 0.033)
-CONTINUED_REACHES = (0.15, 0.09, 0.065, 0.045, 0.033)
-FRESH_EVALUATIONS = len(FRESH_REACHES) * STEP_EVALUATIONS + 1.0
-# Two of the evaluations compare the places to start at.
-CONTINUED_EVALUATIONS = len(CONTINUED_REACHES) * STEP_EVALUATIONS + 3.0
 # Evaluations per frame, at least: two fresh hypotheses and one that continues.
 MIN_FIT_EVALUATIONS = 2 * FRESH_EVALUATIONS + CONTINUED_EVALUATIONS
 FRESH_SHARE = 0.45  # share of the evaluations for fresh hypotheses
 REFLECTED_SHARE = 0.25  # share of reflections among the fresh hypotheses
-ALONE_REFLECTED_SHARE = 0.5  # the same in the only frame of a track
 LIMB_POSES = 16  # poses of clips that lend their limbs, for each limb
 LIMB_ROUNDS = 2  # how often each limb is tried
 LIMB_ANGLES = [angles_of(bones) for bones in LIMBS.values()]
 LIMB_EVALUATIONS = LIMB_ROUNDS * len(LIMBS) * (LIMB_POSES + 1.0)
-# Metres. Hypotheses nearer than this continue as one. It is also the standard deviation
-# of the mean that is reported.
-SAME_DISTANCE = 0.03
 
 
 def next_states(exemplars: Exemplars, steps: ClipSteps, count: int) -> Beam:
@@ -72,7 +67,6 @@ def next_states(exemplars: Exemplars, steps: ClipSteps, count: int) -> Beam:
     sources = kernels.Sources(
         beam.totals,
         steps.codes,
-        steps.root_costs,
         exemplars.near_groups(steps.codes),
     )
     least = beam.totals.min()
@@ -86,6 +80,7 @@ def next_states(exemplars: Exemplars, steps: ClipSteps, count: int) -> Beam:
     )
     bins = yaw_bins(steps.yaws)
     cheapest_first = np.argsort(beam.totals, kind="stable")
+    # bin by bin, because a pose may be reached at several yaws, once in each bin
     by_bin: list[tuple[Rows, Rows, Array]] = []
     for number in np.unique(bins):
         rows = cheapest_first[bins[cheapest_first] == number]
@@ -93,11 +88,13 @@ def next_states(exemplars: Exemplars, steps: ClipSteps, count: int) -> Beam:
             kernels.cheapest_steps(sources, rows, exemplars.tiles, room, bounds)
         )
     states, parents, totals = (
-        np.tile(np.concatenate(parts), 3) for parts in zip(*by_bin, strict=True)
+        np.tile(np.concatenate(parts), len(CANDIDATE_TURNS))
+        for parts in zip(*by_bin, strict=True)
     )
-    turns = np.repeat([0.0, -CANDIDATE_TURN, CANDIDATE_TURN], len(states) // 3)
-    totals = totals + 0.5 * (turns / steps.step.turn) ** 2
-    reached = Beam(states, steps.yaws[parents] + turns, totals, steps.places[parents])
+    turns = np.repeat(CANDIDATE_TURNS, len(states) // len(CANDIDATE_TURNS))
+    totals = totals + 0.5 * turns**2
+    yaws = steps.yaws[parents] + steps.step.turn * turns
+    reached = Beam(states, yaws, totals, steps.places[parents])
     return reached.rows(diverse_best(exemplars, reached, totals, count))
 
 
@@ -175,7 +172,7 @@ class StateProposals:
             The states, and the number of small pictures that were evaluated.
 
         """
-        group_count = min(SEARCHED_GROUPS, max(count // (4 * GROUP_POSES), 1))
+        group_count = max(int(SIMILAR_SHARE * count) // GROUP_POSES, 1)
         tried = max(count - group_count * GROUP_POSES, 1)
         known = frame_costs.yaw
         if before is None and known is None:
@@ -231,7 +228,7 @@ class StateProposals:
         code = self.exemplars.coding.of_poses(np.array([[yaw, 0.0, 0.0, *angles]]))[0]
         # squared distances up to a constant, which does not change their order
         squares = (codes**2).sum(axis=1) - 2.0 * (codes @ code)
-        turns = [-CANDIDATE_TURN, 0.0, CANDIDATE_TURN]
+        turns = TURN_SPREAD * np.array(CANDIDATE_TURNS)
         room = min(count // len(turns), BEAM_STATES)
         nearest = np.argsort(squares, kind="stable")[:room]
         states = np.tile(nearest, len(turns))
@@ -254,7 +251,10 @@ class StateProposals:
         )
 
     def _placed(self, frame_costs: FrameCosts, beam: Beam) -> Beam:
-        """Return states with aligned roots."""
+        """Return states at the known root, or with aligned roots."""
+        if self._task.translation == "known":
+            # the poses, which would take long to copy, do not matter
+            return replace(beam, places=frame_costs.at_root(beam.places))
         places = frame_costs.aligned(poses_of(self.exemplars, beam), beam.places)
         return replace(beam, places=places)
 
@@ -298,11 +298,11 @@ class HypothesisProposals:
         evaluations = max(evaluations, MIN_FIT_EVALUATIONS)
         if frame_costs.alone:
             fresh = race_count(evaluations)
-            return Counts(fresh, fresh - 1 - int(ALONE_REFLECTED_SHARE * fresh), 0)
-        fresh = max(int(FRESH_SHARE * evaluations / FRESH_EVALUATIONS), 2)
-        continued = int(
-            (evaluations - fresh * FRESH_EVALUATIONS) / CONTINUED_EVALUATIONS
-        )
+            continued = 0
+        else:
+            fresh = max(int(FRESH_SHARE * evaluations / FRESH_EVALUATIONS), 2)
+            rest = evaluations - fresh * FRESH_EVALUATIONS
+            continued = int(rest / CONTINUED_EVALUATIONS)
         return Counts(fresh, fresh - 1 - int(REFLECTED_SHARE * fresh), continued)
 
     def continuing(
@@ -319,7 +319,8 @@ class HypothesisProposals:
         count = self.counts(frame_costs).continued
         flat = hypotheses.joints.reshape(len(hypotheses.joints), -1)  # (n, 81)
         joints = flat.astype(np.float32)
-        same = squared_distances(joints, joints) < SAME_DISTANCE**2 * len(JOINTS)
+        reach = same_distance(frame_costs.camera_count)
+        same = squared_distances(joints, joints) < reach**2 * len(JOINTS)
         rows: list[int] = []
         for row in np.argsort(totals, kind="stable"):
             if not same[row, rows].any():

@@ -2,29 +2,16 @@
 
 from collections import deque
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
 from posefit.arrays import Array
 from posefit.geometry.rotation import wrapped
-from posefit_exemplars.frame_costs import FrameCosts
-from posefit_exemplars.markov import SampledPaths, windows
+from posefit_exemplars.estimate import Estimate
+from posefit_exemplars.markov import windows
 
 FILTER_REACH = 3.0  # standard deviations, to either side
-
-
-@dataclass(frozen=True, eq=False)
-class Estimate:
-    """The pose estimated in a frame."""
-
-    pose: Array  # (66,)
-    place: Array  # (3,)
-    frame_costs: FrameCosts = field(repr=False)
-    evaluations: float
-    # poses (n, 66) and places (n, 3) of diverse other states
-    alternatives: tuple[Array, Array] = field(repr=False)
-    paths: SampledPaths | None = None
 
 
 def smoothed(

@@ -189,30 +189,24 @@ class TrackFilter:
     def _start(self, observation: Observation) -> Belief:
         """Return the belief in the state (43,) that fits this frame best.
 
-        Typical poses of the models are tried at several yaws, then samples around the
-        best so far. All models are equally probable.
+        All models are equally probable.
         """
-        task = self._task
-        latest = self._latest
-        yaw = task.yaw
-        anchor = np.asarray(task.anchor)
-        known_pose = None
-        if latest is not None:
-            yaw = float(latest.pose[0])
-            anchor = latest.translation
-            known_pose = latest.pose
-        elif task.first_pose is not None:
-            known_pose = np.concatenate([[yaw or 0.0, 0.0, 0.0], task.first_pose])
-        budget = task.evaluations - 1
-        yaws = YAWS_ALL_AROUND if yaw is None else yaw + YAWS_NEAR
-        states = self.switching.models.typical_states(yaws, anchor)
-        count = min(len(states), int(TYPICAL_SHARE * budget))
-        if known_pose is not None:
-            count -= 1  # for the known pose
-        count = max(1, count)
-        states = states[np.linspace(0, len(states) - 1, count).astype(np.int64)]
-        if known_pose is not None:
-            states = np.concatenate([encode(known_pose[None], anchor[None]), states])
+        state, self._evaluations = self._best_state(observation)
+        self.switching.restart()
+        deviations = INITIAL_DEVIATIONS * np.maximum(self._free, STIFF)
+        self._bad_frames = 0
+        limbs = ("left hand", "right hand", "left foot", "right foot")
+        self._missing = dict.fromkeys(limbs, 0)
+        return self.switching.start(state, np.diag(deviations**2))
+
+    def _best_state(self, observation: Observation) -> tuple[Array, int]:
+        """Return the state (43,) of least cost in a frame, and the evaluations used.
+
+        Typical poses of the models are tried at several yaws, then samples around the
+        best so far.
+        """
+        budget = self._task.evaluations - 1
+        states = self._typical_states(int(TYPICAL_SHARE * budget))
         costs, states = self._aligned_costs(observation, states)
         best = states[costs.argmin()]
         best_cost = float(costs.min())
@@ -229,13 +223,36 @@ class TrackFilter:
                 best = states[costs.argmin()]
                 best_cost = float(costs.min())
             evaluations += DRAWS
-        self.switching.restart()
-        deviations = INITIAL_DEVIATIONS * np.maximum(self._free, STIFF)
-        self._bad_frames = 0
-        limbs = ("left hand", "right hand", "left foot", "right foot")
-        self._missing = dict.fromkeys(limbs, 0)
-        self._evaluations = evaluations
-        return self.switching.start(best, np.diag(deviations**2))
+        return best, evaluations
+
+    def _typical_states(self, most: int) -> Array:
+        """Return typical states (n, 43) of the models, turned to several yaws.
+
+        A known pose comes before them: the latest one of a lost track, or a given first
+        pose. There are at most `most` states, but one typical one at least.
+        """
+        task = self._task
+        latest = self._latest
+        yaw = task.yaw
+        anchor = np.asarray(task.anchor)
+        known_pose = None
+        if latest is not None:
+            yaw = float(latest.pose[0])
+            anchor = latest.translation
+            known_pose = latest.pose
+        elif task.first_pose is not None:
+            known_pose = np.concatenate([[yaw or 0.0, 0.0, 0.0], task.first_pose])
+        yaws = YAWS_ALL_AROUND if yaw is None else yaw + YAWS_NEAR
+        states = self.switching.models.typical_states(yaws, anchor)
+        count = min(len(states), most)
+        if known_pose is not None:
+            count -= 1
+        count = max(1, count)
+        # evenly over all models and yaws
+        states = states[np.linspace(0, len(states) - 1, count).astype(np.int64)]
+        if known_pose is None:
+            return states
+        return np.concatenate([encode(known_pose[None], anchor[None]), states])
 
     def _aligned_costs(
         self, observation: Observation, states: Array

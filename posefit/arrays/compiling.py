@@ -94,13 +94,22 @@ class _Saving(event.Listener):  # type: ignore[misc]
     def on_end(self, event: Any) -> None:
         """Lock a function's folder once it is compiled; unlock it once it is saved."""
         if event.kind == "numba:compile":
-            folder = _folders.get(event.data["dispatcher"].py_func.__module__)
-            if folder is not None:
-                saving = ExitStack()
-                self._thread.saving = saving
-                saving.enter_context(_locked(folder))
-                saving.callback(_list_files, folder)
-            return
+            self._compiled(event.data["dispatcher"].py_func.__module__)
+        else:
+            self._saved()
+
+    def _compiled(self, module: str) -> None:
+        """Lock the folder of a module, in which numba saves a function next."""
+        folder = _folders.get(module)
+        if folder is not None:
+            saving = ExitStack()
+            self._thread.saving = saving
+            saving.enter_context(_locked(folder))
+            # before the lock is released
+            saving.callback(_list_files, folder)
+
+    def _saved(self) -> None:
+        """List the files of the folder that this thread has locked, and unlock it."""
         saving = self._thread.__dict__.pop("saving", None)
         if saving is not None:
             saving.close()
@@ -128,6 +137,7 @@ def state_of(module: str) -> str:
     digest = hashlib.sha256(numba.__version__.encode())
     modules = [module]
     own = ("posefit", module.partition(".")[0])
+    # the list grows while it is read: a module adds those that it imports from
     for name in modules:
         loaded = sys.modules[name]
         digest.update(Path(str(loaded.__file__)).read_bytes())

@@ -51,6 +51,9 @@ TINY = 1e-9
 # centre to the last disc's; how much less the last radius is; the length of the bone;
 # and the length of the cone's sides, 0 if one disc covers the other
 X0, Y0, R0, DX, DY, TAPER, LENGTH, SIDE = range(8)
+# A bone has six numbers: the columns and rows of its first and its last disc, then both
+# radii. Row 0 has the indices of the first disc's column, row and radius.
+NUMBERS_OF_END = np.array([[0, 1, 4], [2, 3, 5]])
 PRODUCTS = 24  # sums of products of a bone's residuals, see `accumulate`
 
 
@@ -229,23 +232,18 @@ def expand(products, hessians, gradients):
 
     The Hessians (B, 6, 6) and gradients (B, 6) are halved.
     """
-    # the numbers of each end: column, row and radius
-    numbers = np.empty((2, 3), np.int64)
-    for end in range(2):
-        numbers[end, 0] = 2 * end
-        numbers[end, 1] = 2 * end + 1
-        numbers[end, 2] = 4 + end
     for bone in range(products.shape[0]):
         for end in range(2):
             for i in range(3):
-                row = numbers[end, i]
+                row = NUMBERS_OF_END[end, i]
                 gradients[bone, row] += products[bone, 18 + 3 * end + i]
                 for other in range(2):
                     for j in range(3):
                         low = min(i, j)
                         pair = low * (5 - low) // 2 + max(i, j)
                         product = products[bone, 6 * (end + other) + pair]
-                        hessians[bone, row, numbers[other, j]] += product
+                        column = NUMBERS_OF_END[other, j]
+                        hessians[bone, row, column] += product
 
 
 @inlined
@@ -280,15 +278,23 @@ def _write_neighbours(bone, discs, neighbours):
 
 @inlined
 def visible(x, y, bones):
-    """Return whether a point of a bone's border is visible: no neighbour covers it."""
+    """Return whether a point of a bone's border is visible: no neighbour covers it.
+
+    A neighbour that covers it becomes the first one, because it often covers the next
+    point, too.
+    """
     cones = bones.cones
     discs = bones.discs
+    neighbours = bones.neighbours
     shown = True
-    for b in bones.neighbours:
+    for i in range(neighbours.size):
+        b = neighbours[i]
         dx = x - discs[b, 0]
         dy = y - discs[b, 1]
         near = dx * dx + dy * dy < discs[b, 2] * discs[b, 2]
         if near and cone_distance(x, y, cones[b])[0] < -COVERED:
+            neighbours[i] = neighbours[0]
+            neighbours[0] = b
             shown = False
             break
     return shown
@@ -353,11 +359,12 @@ def _accumulate_point(disc, normal, length, contour, scale, bones, products):
     nx, ny = normal
     x = u + radius * nx  # contour (3)
     y = v + radius * ny
-    known, distance, slope_x, slope_y = field_distance(x, y, contour)
-    if known and visible(x, y, bones):
-        weight = length / (1.0 + (distance / scale) ** 2)  # contour (6)
-        slope = slope_x, slope_y, slope_x * nx + slope_y * ny  # contour (4)
-        accumulate(products, share, slope, distance, weight)
+    if visible(x, y, bones):
+        known, distance, slope_x, slope_y = field_distance(x, y, contour)
+        if known:
+            weight = length / (1.0 + (distance / scale) ** 2)  # contour (6)
+            slope = slope_x, slope_y, slope_x * nx + slope_y * ny  # contour (4)
+            accumulate(products, share, slope, distance, weight)
 
 
 @inlined
@@ -380,8 +387,7 @@ def side_points(cone, contour, scale, bones, products):
         u = cone[X0] + share * cone[DX]
         v = cone[Y0] + share * cone[DY]
         disc = share, u, v, radius
-        for k in range(2):
-            across = sine if k == 0 else -sine
+        for across in (sine, -sine):
             normal = cosine * dx - across * dy, cosine * dy + across * dx
             _accumulate_point(disc, normal, piece, contour, scale, bones, products)
 
@@ -394,24 +400,21 @@ def cap_points(cone, contour, scale, bones, products):
     dy = cone[DY] / length
     # the angle from the axis to the normal of the cone's side
     tilt = math.acos(cone[TAPER] / length)
-    for i in range(2 * CAP):
-        # the arc of the last disc comes before the arc of the first
-        last = i < CAP
-        share = 1.0 if last else 0.0
-        start = 0.0 if last else tilt
-        arc = tilt if last else math.pi - tilt
-        angle = start + arc * ((i % CAP + 0.5) / CAP)
-        along = math.cos(angle)
-        sine = math.sin(angle)
+    # the arc of the last disc is around the axis, the arc of the first around its
+    # opposite
+    for share, start, arc in ((1.0, 0.0, tilt), (0.0, tilt, math.pi - tilt)):
         radius = cone[R0] - share * cone[TAPER]
-        piece = radius * arc / CAP
         u = cone[X0] + share * cone[DX]
         v = cone[Y0] + share * cone[DY]
         disc = share, u, v, radius
-        for k in range(2):
-            across = sine if k == 0 else -sine
-            normal = along * dx - across * dy, along * dy + across * dx
-            _accumulate_point(disc, normal, piece, contour, scale, bones, products)
+        piece = radius * arc / CAP
+        for i in range(CAP):
+            angle = start + arc * ((i + 0.5) / CAP)
+            along = math.cos(angle)
+            sine = math.sin(angle)
+            for across in (sine, -sine):
+                normal = along * dx - across * dy, along * dy + across * dx
+                _accumulate_point(disc, normal, piece, contour, scale, bones, products)
 
 
 @inlined
@@ -485,34 +488,29 @@ def _project_joints(camera, frames, centres, scales, moves):
 
 
 @inlined
-def _end_of(k, b, parent):
-    """Return the joint to which the k-th of a bone's six numbers belongs."""
-    return parent if k in (0, 1, 4) else b + 1
-
-
-@inlined
 def _write_twist_rows(b, parent, radii, frames, moves, rows):
     """Write the derivatives (6, 6) of a bone's six numbers by a twist. contour (8).
 
     A twist is a velocity, then a rotation.
     """
-    for k in range(6):
-        j = _end_of(k, b, parent)
-        which = k % 2 if k < 4 else 2
-        size = radii[b, 0] if k == 4 else radii[b, 1]
-        factor = 1.0 if k < 4 else size
-        mx = factor * moves[j, which, 0]
-        my = factor * moves[j, which, 1]
-        mz = factor * moves[j, which, 2]
-        x = frames[j, 3, 0]
-        y = frames[j, 3, 1]
-        z = frames[j, 3, 2]
-        rows[k, 0] = mx
-        rows[k, 1] = my
-        rows[k, 2] = mz
-        rows[k, 3] = y * mz - z * my
-        rows[k, 4] = z * mx - x * mz
-        rows[k, 5] = x * my - y * mx
+    for end in range(2):
+        joint = parent if end == 0 else b + 1
+        x = frames[joint, 3, 0]
+        y = frames[joint, 3, 1]
+        z = frames[joint, 3, 2]
+        for kind in range(3):
+            # a radius in pixels is one in metres times the pixels of a metre
+            factor = radii[b, end] if kind == 2 else 1.0
+            mx = factor * moves[joint, kind, 0]
+            my = factor * moves[joint, kind, 1]
+            mz = factor * moves[joint, kind, 2]
+            row = rows[NUMBERS_OF_END[end, kind]]
+            row[0] = mx
+            row[1] = my
+            row[2] = mz
+            row[3] = y * mz - z * my
+            row[4] = z * mx - x * mz
+            row[5] = x * my - y * mx
 
 
 @inlined
@@ -583,13 +581,15 @@ def _add_growth(b, parent, rows, scales, drawn, worth, grown, forces):
     factors = len(grown.joints)
     changes = np.zeros((6, 1 + factors))
     changed = np.zeros((6, 1 + factors))
-    for k in range(6):
-        j = _end_of(k, b, parent)
-        for f in range(factors):
-            for i in range(3):
-                changes[k, 1 + f] += rows[k, i] * grown.joints[f, j, i]
-            if k > 3:
-                changes[k, 1 + f] += scales[j] * grown.radii[f, b, k - 4]
+    for end in range(2):
+        joint = parent if end == 0 else b + 1
+        for kind in range(3):
+            k = NUMBERS_OF_END[end, kind]
+            for f in range(factors):
+                for i in range(3):
+                    changes[k, 1 + f] += rows[k, i] * grown.joints[f, joint, i]
+                if kind == 2:
+                    changes[k, 1 + f] += scales[joint] * grown.radii[f, b, end]
     for k in range(6):
         changed[k, 0] = worth * gradient[k]
         for i in range(6):

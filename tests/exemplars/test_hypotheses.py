@@ -10,16 +10,14 @@ from posefit.arrays import Array
 from posefit.fitting.tracker import Task
 from posefit.geometry.skeleton import JOINTS, LIMBS, angles_of
 from posefit.motion import built_in
+from posefit.silhouette.mask import Silhouette
 from posefit_exemplars.cost_model import (
-    MAX_PART_COST,
-    PARTS,
-    max_part_cost,
-    part_step_costs,
+    motion_step_costs,
 )
+from posefit_exemplars.estimate import Estimate
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import Hypotheses
 from posefit_exemplars.proposals import Counts
-from posefit_exemplars.smoothing import Estimate
 from posefit_exemplars.tracker import ExemplarTracker
 from tests.cases import each
 from tests.exemplars.conftest import Walk, walk_of
@@ -38,48 +36,19 @@ def single(code: float, rate: float, joint: str = "lwrist") -> Hypotheses:
     return Hypotheses(still, nothing, joints, still, nothing, rates)
 
 
-def test_every_joint_is_in_one_part() -> None:
-    assert sorted(np.concatenate(PARTS)) == list(range(len(JOINTS)))
-
-
-def test_costs_of_steps_by_hand() -> None:
+def test_what_steps_cost_by_hand() -> None:
     def cost(code: float, rate: float, later: float, later_rate: float) -> float:
         return float(
-            part_step_costs(
-                0.03, MAX_PART_COST, single(code, rate), single(later, later_rate)
-            )[0, 0]
+            motion_step_costs(0.03, single(code, rate), single(later, later_rate))[0, 0]
         )
 
     # it goes on as it does
     np.testing.assert_allclose(cost(0.0, 0.06, 0.06, 0.06), 0.0, atol=1e-5)
     np.testing.assert_allclose(cost(0.1, 0.0, 0.1, 0.0), 0.0, atol=1e-5)
-    # it stops for a frame, at speed 0
-    np.testing.assert_allclose(cost(0.0, 0.06, 0.0, 0.06), 0.3, atol=1e-5)
-    # half as fast
-    np.testing.assert_allclose(cost(0.0, 0.06, 0.03, 0.06), 0.1, atol=1e-5)
-    # off by a spread at speed 1, a half; at the speed 1.4 it is off by 0.09 - 0.084, which is 0.02, and 0.15
-    np.testing.assert_allclose(cost(0.0, 0.06, 0.09, 0.06), 0.17, atol=1e-5)
-    # at rest, then at a spread's rate: 0.015 off and the rates a spread apart, an eighth and a half; at speed 0.5,
-    # 0.0075 off and half the rates, 1/32 and 1/8, and 0.1
-    np.testing.assert_allclose(
-        cost(0.0, 0.0, 0.0, 0.03), 1 / 32 + 1 / 8 + 0.1, atol=1e-5
-    )
-    assert cost(0.0, 0.0, 1.0, 0.0) == MAX_PART_COST
-    both = single(1.0, 0.0)  # two parts that are far off cost twice as much as one
-    both.joints[0, JOINTS.index("rfoot"), 1] = 9.0
-    assert (
-        float(part_step_costs(0.03, MAX_PART_COST, single(0.0, 0.0), both)[0, 0])
-        == 2.0 * MAX_PART_COST
-    )
-
-
-def test_jumps_cost_more_where_masks_are_less_precise() -> None:
-    assert [max_part_cost(noise) for noise in (1.0, 1.5, 2.0, 9.0)] == [
-        4.0,
-        9.0,
-        12.0,
-        12.0,
-    ]
+    # off by a spread: a half
+    np.testing.assert_allclose(cost(0.0, 0.06, 0.09, 0.06), 0.5, atol=1e-5)
+    # at rest, then at a spread's rate: 0.015 off and the rates a spread apart
+    np.testing.assert_allclose(cost(0.0, 0.0, 0.0, 0.03), 1 / 8 + 1 / 2, atol=1e-5)
 
 
 def test_legs_of_one_clip_go_with_the_arms_of_another() -> None:
@@ -149,7 +118,33 @@ def test_the_right_one_of_two_hypotheses_is_reported_even_where_the_path_is_turn
     )
 
 
-def test_poses_of_an_earlier_track_are_tried_with_exchanged_and_other_limbs() -> None:
+def test_fewer_hypotheses_are_the_same_the_more_cameras_there_are() -> None:
+    walk = walk_of(built_in.motion("walk-a", frames=2), (0.0, 90.0))
+    joints = np.zeros((3, len(JOINTS), 3))
+    joints[1] += 0.005 / np.sqrt(3.0)  # half a centimetre from the first
+    joints[2] += 0.02 / np.sqrt(3.0)
+    still = np.zeros((3, 66))
+    hypotheses = Hypotheses(still, still[:, :3], joints, still, still[:, :3], joints)
+    totals = np.array([0.0, 1.0, 2.0])
+    task = replace(walk.task, evaluations=BUDGET)
+    observation = walk.observations[0]
+
+    def continuing(silhouettes: Sequence[Silhouette]) -> list[int]:
+        shown = replace(observation, silhouettes=silhouettes)
+        frame_costs = FrameCosts(task, shown)
+        proposals = ExemplarTracker(task).hypotheses.proposals
+        return proposals.continuing(hypotheses, totals, frame_costs).tolist()
+
+    first, second = observation.silhouettes
+    unknown = np.zeros_like(second.valid)
+    hidden = Silhouette.of(np.zeros_like(second.mask), unknown)
+    assert continuing([first, second]) == [0, 2]
+    assert continuing([first, hidden]) == [0]
+
+
+def test_what_an_earlier_track_had_is_tried_with_exchanged_and_with_other_limbs() -> (
+    None
+):
     walk = walk_of(built_in.motion("walk-a", frames=2), (0.0, 90.0))
     truth = walk.motion.poses[:1]
     arm = angles_of(LIMBS["left arm"])
@@ -192,7 +187,7 @@ def test_poses_of_an_earlier_track_are_tried_with_exchanged_and_other_limbs() ->
 
 
 @each(("alone", "weight"), [(False, 4.0), (True, 1.0)])
-def test_with_an_earlier_track_and_two_views_clips_count_half_as_much(
+def test_beside_an_earlier_track_clips_count_half_as_much_against_two_views(
     alone: bool, weight: float
 ) -> None:
     walk = walk_of(built_in.motion("walk-a", frames=2), (0.0, 90.0))
@@ -208,7 +203,7 @@ def test_with_an_earlier_track_and_two_views_clips_count_half_as_much(
     def apart(observation: Observation) -> float:
         totals = follower._joined(
             FrameCosts(walk.task, observation, alone), hypotheses, None, 1.0
-        )[0].totals
+        )[0].paths.totals
         return float(totals[1] - totals[0])
 
     off = follower._exemplars.nearest(poses, 1)[1][:, 0] / 0.05**2

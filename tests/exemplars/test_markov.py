@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
+from posefit_exemplars.estimate import Estimate
 from posefit_exemplars.markov import (
     SampledPaths,
     frame_states,
     mean_near,
     state_weights,
 )
-from posefit_exemplars.smoothing import Estimate, smoothed, smoothed_pose
+from posefit_exemplars.smoothing import smoothed, smoothed_pose
 from tests.cases import each
 
 

@@ -84,14 +84,17 @@ def test_the_reported_path_is_the_cheapest() -> None:  # RABINER1989 (Viterbi)
             costs = ways(one, count)
             best = min(costs, key=lambda way: costs[way])
             assert [
-                markov.viterbi_state(one.frames[k:count]) for k in range(count)
+                markov.viterbi_state([frame.paths for frame in one.frames[k:count]])
+                for k in range(count)
             ] == list(best)
             each = [
                 min(cost for way, cost in costs.items() if way[-1] == row)
                 for row in range(SIZES[count - 1])
             ]
             np.testing.assert_allclose(
-                one.frames[count - 1].totals, np.array(each) - min(each), atol=1e-12
+                one.frames[count - 1].paths.totals,
+                np.array(each) - min(each),
+                atol=1e-12,
             )
 
 
@@ -134,10 +137,8 @@ def test_a_step_is_as_likely_as_it_is_frequent_in_the_clips() -> None:
             np.zeros(2),
             np.zeros((2, 3)),
         )
-        steps = ClipSteps.of(
-            clips, before, Step(seconds, 0.03), clips.places[state + 1]
-        )
-        following, last = steps.costs(clips, beams)[0]
+        steps = ClipSteps.of(clips, before, Step(seconds, 0.03))
+        following, last = steps.costs(clips, beams, aligned=False)[0]
         assert following == pytest.approx(0.0, abs=1e-4)
         off = float(((clips.codes[state + 1] - clips.codes[after]) ** 2).sum())
         assert last == pytest.approx(min(0.5 * off / 0.03**2, 12.0), abs=1e-3)
