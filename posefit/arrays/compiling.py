@@ -25,6 +25,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
+from types import ModuleType
 from typing import Any
 
 import numba
@@ -132,7 +133,7 @@ def state_of(module: str) -> str:
     """Return a module's name with a digest of everything that its functions depend on.
 
     That is the module's source, the constants that it imports, and the same for the
-    modules of the functions that it imports.
+    modules that it imports, by themselves or a function of theirs.
     """
     digest = hashlib.sha256(numba.__version__.encode())
     modules = [module]
@@ -144,6 +145,9 @@ def state_of(module: str) -> str:
         for key, value in sorted(vars(loaded).items()):
             constant = isinstance(value, int | float | str | tuple | np.generic)
             owner = getattr(value, "__module__", None)
+            # what a package holds depends on what was imported before
+            if isinstance(value, ModuleType) and not hasattr(value, "__path__"):
+                owner = value.__name__
             if isinstance(value, np.ndarray):
                 digest.update(key.encode() + value.tobytes())
             elif constant and not key.startswith("__"):

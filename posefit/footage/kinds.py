@@ -91,6 +91,7 @@ class Kind(NamedTuple):
     film: Callable[[Any, float | None, int], Video] | None = None
     # place to the number of its first frame; None if frames are counted from 0
     first: Callable[[Any], int] | None = None
+    has_categories: bool = False  # whether a label may be a category's name
 
 
 def _is_film(place: Place) -> bool:
@@ -127,7 +128,9 @@ KINDS = (
     Kind("masks", lambda place: isinstance(place, np.ndarray), view=read_array),
     Kind("masks", _ends_in(".npz"), view=read_npz, first=first_number),
     Kind("masks", _ends_in(".npy"), view=read_npy),
-    Kind("masks", _ends_in(ANNOTATIONS), view=read_annotations),
+    Kind(
+        "masks", _ends_in(ANNOTATIONS), view=read_annotations, has_categories=True
+    ),
     Kind("pictures", _is_film, film=Video.of_pictures),
     Kind("masks", lambda place: isinstance(place, Images), view=read_images),
     Kind("video", _is_video, film=lambda place, _, width: Video.of(place, width)),

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, cast
 
 from posefit.errors import InputError, NoPersonError
-from posefit.footage.annotations import ANNOTATIONS, read_annotations
+from posefit.footage.annotations import ANNOTATIONS
 from posefit.footage.cameras import combined, same_person
 from posefit.footage.cleaning import cleaned
 from posefit.footage.extraction import Extraction
@@ -180,7 +180,7 @@ def views_of_masks(
     """
     views = list[View]()
     for kind, place in zip(source.kinds, source.places, strict=True):
-        if isinstance(label, str) and kind.view is not read_annotations:
+        if isinstance(label, str) and not kind.has_categories:
             raise InputError(
                 f"category must be given for annotations ({ANNOTATIONS}) only, "
                 f"got {quoted(label)}"

@@ -230,7 +230,7 @@ def clips(
             chosen.append(clip)
     if not chosen:
         raise InputError(
-            "the library must keep at least one person, got everybody left out"
+            "the library must keep at least one person, got all of them left out"
         )
     return chosen
 

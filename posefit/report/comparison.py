@@ -153,6 +153,12 @@ def compare(
     if "grid" in lists:
         grid["grid"] = lists.pop("grid")
     plan = Plan.of({"product": crossed, "defaults": lists, **grid})
+    pool = Pool(
+        cores() if workers is None else workers,
+        Limits(),
+        run_cell,
+        partial(register, factories),
+    )
     folder = _temporary_folder() if out is None else Path(out)
     say = interactive().log
     if factories and folder.exists():
@@ -161,12 +167,6 @@ def compare(
             f"cells of {names} run again, although {folder} may hold them: "
             "only rows of registered methods are reused"
         )
-    pool = Pool(
-        cores() if workers is None else workers,
-        Limits(),
-        run_cell,
-        partial(register, factories),
-    )
     try:
         tally = swept(plan, folder, pool, say)
     except BaseException:

@@ -41,13 +41,16 @@ def rerun(ledger: str | Path, key: str, out: str | Path | None = None) -> list[s
     Raises:
         ValueError: No row or several have the key, or the cell cannot be planned with
             this version of posefit.
+        KeyboardInterrupt: It was stopped before the cell had ended.
     """
     earlier = _row_of(ledger, key)
     plan = Plan.of(plan_tables(earlier["spec"]))
     with TemporaryDirectory(prefix="posefit-") as temporary:
         folder = Path(temporary) / "rerun" if out is None else Path(out)
         start = engine(Limits(), workers=1)
-        swept(plan, folder, start(), interactive().log, quiet=True)
+        tally = swept(plan, folder, start(), interactive().log, quiet=True)
+        if tally.stopped:
+            raise KeyboardInterrupt
         (cell,) = plan
         with Ledger(folder) as results:
             now = next(row for row in results.all_rows() if row["key"] == cell.key)

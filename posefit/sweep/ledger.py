@@ -22,6 +22,7 @@ process. The operating system releases that lock when the process ends in any wa
 
 import json
 import os
+import shlex
 import socket
 import sqlite3
 import stat
@@ -235,7 +236,7 @@ class Ledger:
         return InputError(
             f"{file}: the row of cell {name} must be written by posefit: "
             f"{cut(text_of(error))}; "
-            f'to run it again: sqlite3 {FILE} "{statement}"'
+            f'to run it again: sqlite3 {shlex.quote(str(file))} "{statement}"'
         )
 
     def _rows(self, status: str) -> Iterator[dict[str, Any]]:

@@ -176,7 +176,7 @@ def _tracks(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
         names = set[str]().union(*(_fields(field, entry) for entry in entries))
         if names & said:
             raise InputError(
-                f"product must say {min(names & said)} in one list, got it in two"
+                f"product must set {min(names & said)} in one list, got it in two"
             )
         said |= names
     if "methods" in crossed:

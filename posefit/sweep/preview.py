@@ -121,19 +121,23 @@ def _value_lines(counts: Mapping[str, Counter[str]]) -> list[str]:
 def _seconds_of(cells: Sequence[Cell], pool: Pool) -> float:
     """Return about how many seconds one method's cells take.
 
-    The estimate is from two short runs of the first one. Raises InputError if a run
-    fails.
+    The estimate is from two short runs of the first one, or from the whole of it if it
+    is a search. Raises InputError if a run fails.
     """
     first = cells[0]
     amount = sum(map(_amount, cells))
     if not isinstance(first, TrackCell):
         return _seconds(first, pool) / _amount(first) * amount
     short = replace(first, frames=SHORT)
-    longer = replace(first, frames=LONGER)
+    # a motion may be shorter
+    longer = replace(first, frames=min(first.frames, LONGER))
     _seconds(longer, pool)  # imports and compiles
-    of_short = _seconds(short, pool)
+    of_longer = _seconds(longer, pool)
     more = _amount(longer) - _amount(short)
-    slope = max((_seconds(longer, pool) - of_short) / more, 0.0)
+    if not more:
+        return of_longer * len(cells)
+    of_short = _seconds(short, pool)
+    slope = max((of_longer - of_short) / more, 0.0)
     fixed = max(of_short - slope * _amount(short), 0.0)
     return fixed * len(cells) + slope * amount
 
@@ -154,5 +158,6 @@ def _seconds(cell: Cell, pool: Pool) -> float:
     if outcome.reason is not None:
         settings = ", ".join(settings_text(cell.settings))
         method = f"{cell.method} with {settings}" if settings else cell.method
-        raise InputError(f"{method} fails in its first frames: {outcome.reason}")
+        where = "first frames" if isinstance(cell, TrackCell) else "first search"
+        raise InputError(f"{method} fails in its {where}: {outcome.reason}")
     return float(outcome.result["seconds"])

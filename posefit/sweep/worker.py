@@ -35,6 +35,7 @@ from posefit.sweep.engine import Limits, Outcome, Run, single_thread, text_of
 
 MARK = "POSEFIT_WORKER"  # the environment variable of a process' mark
 BEGUN = b""  # a worker sends this when it begins a job
+START_SECONDS = 600.0  # the longest that a process takes to begin its first job
 END_SECONDS = 1.0  # the longest that a process without a connection takes to end
 _starting = threading.Lock()
 # all signals but the two that no process can handle
@@ -75,6 +76,7 @@ class Worker:
         self._limits = limits
         self._job: Any = None
         self._deadline = inf
+        self._late = ""  # why the job fails at the deadline
         self.connection, other_end = multiprocessing.Pipe()
         self._process = _Process(
             target=_serve,
@@ -97,6 +99,8 @@ class Worker:
     def begin(self, job: Any) -> None:
         """Send a job to the process."""
         self._job = job
+        self._deadline = time.monotonic() + START_SECONDS
+        self._late = f"its process did not begin it within {START_SECONDS:g} s"
         # `outcome` tells what became of a process that ended meanwhile
         with suppress(OSError):
             self.connection.send_bytes(cloudpickle.dumps(job))
@@ -111,6 +115,7 @@ class Worker:
             while answer == BEGUN and self.connection.poll():
                 answer = self.connection.recv_bytes()
                 self._deadline = time.monotonic() + self._limits.seconds
+                self._late = f"it ran past its limit of {self._limits.seconds:g} s"
         except (EOFError, OSError):
             # The process has ended, or a job has closed the connection. `join` would
             # wait without limit for a job that has closed its other files, too.
@@ -122,9 +127,7 @@ class Worker:
             if not self.is_alive:
                 return self._ended()
             if time.monotonic() > self._deadline:
-                return self._failed(
-                    f"it ran past its limit of {self._limits.seconds:g} s"
-                )
+                return self._failed(self._late)
             return None
         try:
             outcome = Outcome(self._job, *pickle.loads(answer))

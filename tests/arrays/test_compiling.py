@@ -96,6 +96,19 @@ def test_a_change_of_another_file_of_the_package_is_no_stale_result(run: Any) ->
     assert run() == (12.0, [])
 
 
+def test_a_change_of_a_module_that_is_imported_whole_is_no_stale_result(
+    run: Any, tmp_path: Path
+) -> None:
+    loops = LOOPS.replace(
+        "from constants import FACTOR", "from package import constants"
+    )
+    loops = loops.replace("FACTOR *", "constants.FACTOR *")
+    (tmp_path / "package/loops.py").write_text(loops)
+    assert run() == (12.0, ["scaled"])
+    assert run(factor=2.0) == (24.0, ["scaled"])
+    assert run() == (12.0, [])
+
+
 def emptied(file: Path) -> None:
     file.write_bytes(b"")
 

@@ -559,7 +559,7 @@ def test_the_way_that_is_doubted_least_takes_the_person_out(
         return [SimpleNamespace(name=way.name, doubt="" if doubt is None else "jumpy")]
 
     monkeypatch.setattr(source, "Segmentation", lambda *_: None)
-    monkeypatch.setattr(source, "_taken_out", taken_out)
+    monkeypatch.setattr(source, "_segmented", taken_out)
     taken = source._of_films(
         [None],
         [],
@@ -584,7 +584,7 @@ def test_only_masks_without_the_person_have_another_way_tried(
         raise InputError("frames of another size")
 
     monkeypatch.setattr(source, "Segmentation", lambda *_: None)
-    monkeypatch.setattr(source, "_taken_out", taken_out)
+    monkeypatch.setattr(source, "_segmented", taken_out)
     with pytest.raises(InputError, match="of another size"):
         source._of_films([None], [], how, (None, None), QUIET, None)
     assert len(tried) == 1

@@ -106,7 +106,7 @@ def test_mistakes_are_reported_in_one_line_and_write_nothing(
         "--out", clips
     )
     assert "cannot write to this folder" in fails("--out", clips / "16" / "16_15.amc")
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     assert "pip install posefit[figures]" in fails("--out", out)
     assert list(tmp_path.iterdir()) == [clips]
 

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shlex
 import signal
 import sqlite3
 import subprocess
@@ -130,6 +131,7 @@ def test_a_row_that_posefit_did_not_write_is_named_with_advice(
         runs_in(folder)
     assert f"{FILE}: the row of cell {key[:8]}" in str(caught.value)
     fix = str(caught.value).partition("to run it again: ")[2]
+    assert fix.startswith(f"sqlite3 {shlex.quote(str(folder / FILE))} ")
     changed(folder, fix.partition('"')[2].rstrip('"'))
     changed(folder, "UPDATE cells SET spec = ? WHERE key = ?", json.dumps(SPEC), key)
     filled(folder, 2)
