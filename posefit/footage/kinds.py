@@ -128,9 +128,7 @@ KINDS = (
     Kind("masks", lambda place: isinstance(place, np.ndarray), view=read_array),
     Kind("masks", _ends_in(".npz"), view=read_npz, first=first_number),
     Kind("masks", _ends_in(".npy"), view=read_npy),
-    Kind(
-        "masks", _ends_in(ANNOTATIONS), view=read_annotations, has_categories=True
-    ),
+    Kind("masks", _ends_in(ANNOTATIONS), view=read_annotations, has_categories=True),
     Kind("pictures", _is_film, film=Video.of_pictures),
     Kind("masks", lambda place: isinstance(place, Images), view=read_images),
     Kind("video", _is_video, film=lambda place, _, width: Video.of(place, width)),

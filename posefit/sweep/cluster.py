@@ -109,7 +109,7 @@ class Cluster:
         # raised by a client whose scheduler went away
         except (OSError, TimeoutError, ValueError, AttributeError):
             raise InputError(
-                f"scheduler must stay connected, got a lost connection to {self._address}"
+                f"scheduler {self._address} must stay connected, got a lost connection"
             ) from None
 
     def submit(self, job: Any, tenant: str = "") -> None:
@@ -124,7 +124,7 @@ class Cluster:
         """Return the outcomes of the jobs that ended."""
         if self._client.status != "running":
             raise InputError(
-                f"scheduler must stay connected, got a lost connection to {self._address}"
+                f"scheduler {self._address} must stay connected, got a lost connection"
             )
         if self._running:
             with (
