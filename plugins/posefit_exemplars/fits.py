@@ -36,7 +36,7 @@ FRESH_EVALUATIONS = len(FRESH_REACHES) * STEP_EVALUATIONS + 1.0
 # Two of the evaluations compare the places to start at.
 CONTINUED_EVALUATIONS = len(CONTINUED_REACHES) * STEP_EVALUATIONS + 3.0
 # Standard deviations of an angle from the start of a fit, and from similar clips.
-START_TURN = np.radians(16.0)
+START_TURN = np.radians(8.0)
 LIBRARY_TURN = np.radians(15.0)
 # Standard deviations of the root from its start, metres.
 KNOWN_SHIFT = 0.003
@@ -79,9 +79,8 @@ class FrameFits:
         self._contours: list[MaskContours] = frame_costs.contours(place)
         self._noise = noise
         shift = ALIGNED_SHIFT if frame_costs.root is None else KNOWN_SHIFT
-        # noisy masks say less, and so the start more: twice as much from the first on
-        turn = START_TURN / (2.0 * noise - 1.0)
-        self._weights = precisions(turn, shift)  # (69,)
+        # noisy masks say less, and so the start more
+        self._weights = precisions(START_TURN / noise, shift)  # (69,)
         self.evaluations = 0.0
 
     def fresh(self, start: PosesAndPlaces) -> PosesAndPlaces:
