@@ -103,9 +103,7 @@ def track(
     followed = named if isinstance(named, str | Path | Motion) else None
     chosen = completed(chosen, followed if known else None)
     # before the work, because a name may be wrong
-    clips = training_clips(
-        chosen.train, chosen.of_files, followed=followed, straight=not known
-    )
+    clips = training_clips(chosen.train, chosen.of_files, followed=followed)
     kinds = chosen_kinds(write)
     for name, value in (("resume", resume), ("force", force), ("write", len(write))):
         if value and out is None:

@@ -112,7 +112,7 @@ def track_live(
     if chosen.method is None or isinstance(chosen.method, str):
         chosen = chosen.changed(method=str(method_names(chosen.method or LIVE_METHOD)))
     chosen = completed(chosen.changed(body_frames=0, smooth=False), None)
-    clips = training_clips(chosen.train, chosen.of_files, straight=True)
+    clips = training_clips(chosen.train, chosen.of_files)
     stream = Stream(source)
     views = live_views(stream, chosen.extraction, progress.log)
     first = list(islice(views, TRIAL_FRAMES * TRIAL_STRIDE))

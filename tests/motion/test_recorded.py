@@ -98,9 +98,7 @@ def test_a_persons_straighter_knee_is_straight_in_one_pose_of_twenty(
     assert np.median(np.concatenate(turned)) < 0.03
 
 
-def test_footage_is_tracked_with_straight_knees_and_known_motions_with_the_recorded_ones() -> (
-    None
-):
+def test_clips_are_recorded_ones_unless_straight_knees_are_asked_for() -> None:
     for straight in (False, True):
         for source in ("library:127", "127_06"):
             clips = training_clips([source], straight=straight)
