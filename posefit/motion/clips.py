@@ -191,8 +191,8 @@ def training_clips(
         stated: what the files do not state.
         followed: the motion that is followed. A folder and the library are used
             without it.
-        straight: whether the people of the library get straight knees, as people in
-            footage have, see `RecordedClip.straightened`.
+        straight: whether the people of the library get straight knees, see
+            `RecordedClip.straightened`. Tracks do not use it.
 
     Raises:
         InputError: there is no such motion, none is left, or the motions would take
