@@ -24,7 +24,15 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.footage.images import PIXELS
 from posefit.footage.numbering import natural, numbered
-from posefit.footage.views import Range, View, empty_planes, full_planes, span, times_of
+from posefit.footage.views import (
+    Range,
+    View,
+    check_some,
+    empty_planes,
+    known_planes,
+    span,
+    times_of,
+)
 from posefit.limits import check_decoded
 from posefit.reading import check_size, cut, existing, quoted
 from posefit.silhouette.mask import Mask
@@ -80,22 +88,14 @@ def read_annotations(
             for shape in content.shapes[images[str(file)]["id"]]:
                 mask |= content.mask(shape, size)
         bits[k] = np.packbits(mask)
-    if not there.any():
-        raise InputError(
-            f"{path}: frames must choose some of the images that are there, "
-            f"got none from {start} to {stop}"
-        )
-    known = None
-    if not there.all():
-        known = full_planes(len(files), size)
-        known[~there] = 0
+    check_some(str(path), there, start)
     numbers = np.arange(start, stop)
     return View(
         name=str(path),
         numbers=numbers,
         times=times_of(numbers, fps),
         bits=bits,
-        known=known,
+        known=known_planes(there, size),
         usable=there,
         size=size,
         fps=fps,

@@ -28,8 +28,8 @@ STEP = MIN_DETECTIONS
 class CutWatch:
     """Watches a pass through a film, frame after frame.
 
-    As long as whoever is in the picture is cut, nothing is known. After two seconds of
-    cut people, it looks ahead, at every eighth frame to the end of the film.
+    While everybody in the picture is cut, it cannot tell whether that will change.
+    After two seconds of that it looks ahead, at every eighth frame to the end.
     """
 
     def __init__(self, scanner: Scanner) -> None:

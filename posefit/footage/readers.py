@@ -29,8 +29,9 @@ from posefit.footage.views import (
     Planes,
     Range,
     View,
+    check_some,
     empty_planes,
-    full_planes,
+    known_planes,
     span,
     times_of,
 )
@@ -90,28 +91,21 @@ def read_images(
     start, stop = span(frames, len(every))
     chosen = every[start:stop]
     there = np.array([file is not None for file, _ in chosen])
-    if not there.any():
-        raise InputError(
-            f"{name}: frames must choose some of the images that are there, "
-            f"got none from {start} to {stop}"
-        )
+    check_some(name, there, start)
     size, is_person, kind = _decided(_marks(chosen, name, label), label, name)
     bits = _pack(_marks(chosen, name, label), int(there.sum()), size, is_person)
-    known = None
     if not there.all():
         shown = bits
         bits = empty_planes(len(chosen), size)
         bits[~there] = 0
         bits[there] = shown
-        known = full_planes(len(chosen), size)
-        known[~there] = 0
     numbers = np.arange(start, stop)
     return View(
         name=name,
         numbers=numbers,
         times=times_of(numbers, fps),
         bits=bits,
-        known=known,
+        known=known_planes(there, size),
         usable=there,
         size=size,
         fps=fps,

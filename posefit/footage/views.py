@@ -229,6 +229,27 @@ def full_planes(count: int, size: tuple[int, int]) -> Planes:
     return planes
 
 
+def check_some(name: str, there: NDArray[np.bool_], start: int) -> None:
+    """Raise InputError if none of the chosen images (T,) is there."""
+    if not there.any():
+        raise InputError(
+            f"{name}: frames must choose some of the images that are there, "
+            f"got none from {start} to {start + len(there)}"
+        )
+
+
+def known_planes(there: NDArray[np.bool_], size: tuple[int, int]) -> Planes | None:
+    """Return planes that are unknown where an image (T,) is missing, else known.
+
+    None if no image is missing.
+    """
+    if there.all():
+        return None
+    known = full_planes(len(there), size)
+    known[~there] = 0
+    return known
+
+
 def span(frames: Range, count: int, first: int = 0) -> tuple[int, int]:
     """Return the indices (start, stop) of a range of frame numbers.
 

@@ -180,7 +180,6 @@ def training_clips(
     stated: FileOptions = RECOGNISED,
     *,
     followed: Source | None = None,
-    straight: bool = False,
 ) -> list[SourceClip]:
     """Return the clips that sources name.
 
@@ -191,8 +190,6 @@ def training_clips(
         stated: what the files do not state.
         followed: the motion that is followed. A folder and the library are used
             without it.
-        straight: whether the people of the library get straight knees, see
-            `RecordedClip.straightened`. Tracks do not use it.
 
     Raises:
         InputError: there is no such motion, none is left, or the motions would take
@@ -202,7 +199,7 @@ def training_clips(
     poses = 0
     most = allowed_bytes()
     for source in sources:
-        for clip in _clips(source, stated, followed, straight):
+        for clip in _clips(source, stated, followed):
             clips.append(clip)
             poses += clip.count(FPS)
             # after each clip, so that a folder of too many is refused before all are
@@ -232,7 +229,7 @@ def _check_memory(poses: int, fps: float, most: int) -> None:
 
 
 def _clips(
-    source: Source, stated: FileOptions, followed: Source | None, straight: bool
+    source: Source, stated: FileOptions, followed: Source | None
 ) -> Iterator[SourceClip]:
     if isinstance(source, str) and recorded.is_library(source):
         stem = _stem(followed)
@@ -243,7 +240,7 @@ def _clips(
                 f"got {source} for {followed}"
             )
         for clip in clips:
-            yield recorded_clip(clip.straightened if straight else clip)
+            yield recorded_clip(clip)
     elif not isinstance(source, Motion) and Path(source).is_dir():
         paths = []
         for path in sorted(Path(source).iterdir()):
@@ -263,8 +260,6 @@ def _clips(
         yield from (clip_of(path, stated) for path in others)
     elif _same(source, followed):
         raise InputError(f"train must not contain the source itself, got {source}")
-    elif straight and recorded.is_recorded(source):
-        yield recorded_clip(recorded.clip(str(source)).straightened)
     else:
         yield clip_of(source, stated)
 

@@ -16,8 +16,8 @@ database was created with funding from NSF EIA-0196217.
 import json
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cache, cached_property, lru_cache
+from dataclasses import dataclass, field
+from functools import lru_cache
 from importlib.resources import files
 
 import numpy as np
@@ -27,11 +27,7 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.geometry.skeleton import (
     ANGLES,
-    BONES,
-    JOINTS,
     Skeleton,
-    angle_index,
-    channel_angles,
 )
 from posefit.motion.built_in import stored_skeleton
 from posefit.motion.motion import Motion
@@ -40,9 +36,6 @@ from posefit.reading import quoted
 FPS = 30.0  # frames per second that the times of clips count
 LIBRARY = "library"  # the name of all clips among the names of motions
 STEP = 0.001  # radians or metres: unit of the stored whole numbers
-# share of a person's poses whose straighter knee is straight: the knees that their
-# skeleton has bent in all others are straightened by as much
-STRAIGHT = 0.05
 _NAME = re.compile(r"\d+_\d+")
 
 
@@ -73,38 +66,6 @@ class RecordedClip:
     def seconds(self) -> float:
         """The clip's duration."""
         return float(self.times[-1]) / FPS
-
-    @cached_property
-    def straightened(self) -> "RecordedClip":
-        """The clip with knees that are straight when the person's are.
-
-        The database's skeletons are fitted to markers, and most of them have bent knees
-        while the person stands. Each knee is bent less by what this person's straighter
-        knee is bent at least, but for one pose in twenty. Ankles stay on their line
-        from the hip, and feet keep their directions.
-        """
-        offset = _least_flexion(self.subject)
-        poses = self.poses.copy()
-        lengths = self.skeleton.lengths
-        for letter in "lr":
-            hip, knee, ankle = (
-                angle_index(JOINTS.index(letter + bone))
-                for bone in ("femur", "tibia", "foot")
-            )
-            thigh, shank = (
-                lengths[BONES.index(letter + bone)] for bone in ("femur", "tibia")
-            )
-            bent = poses[:, knee]  # a leg's first angles turn about one axis
-            straighter = np.minimum(bent, np.maximum(bent - offset, 0.0))
-            before, after = (
-                np.arctan2(shank * np.sin(x), thigh + shank * np.cos(x))
-                for x in (bent, straighter)
-            )
-            poses[:, hip] += before - after
-            poses[:, ankle] += bent - straighter - (before - after)
-            poses[:, knee] = straighter
-        poses.setflags(write=False)
-        return replace(self, poses=poses)
 
     def motion(self) -> Motion:
         """Return the whole clip at 30 frames per second."""
@@ -164,16 +125,6 @@ def _stored() -> dict[str, RecordedClip]:
             name, skeleton.name, skeleton, values[:, :ANGLES], values[:, ANGLES:], times
         )
     return clips
-
-
-@cache
-def _least_flexion(subject: str) -> float:
-    """Return how much a person's straighter knee is bent at least, in radians."""
-    straighter = []
-    for clip in clips([subject]):
-        knees = channel_angles("ltibia", ["rx"]) + channel_angles("rtibia", ["rx"])
-        straighter.append(clip.poses[:, knees].min(axis=1))
-    return float(np.quantile(np.concatenate(straighter), STRAIGHT))
 
 
 def subjects() -> tuple[str, ...]:

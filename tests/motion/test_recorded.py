@@ -6,10 +6,7 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
-from posefit.arrays import Array
-from posefit.geometry.skeleton import JOINTS
 from posefit.motion import recorded
-from posefit.motion.clips import training_clips
 from tests.commands import printed
 
 
@@ -59,53 +56,3 @@ def test_the_command_lists_all_motions() -> None:
         pytest.approx(85 / 30, abs=1e-3),
     )
     assert len(others) == 215
-
-
-def legs(clip: recorded.RecordedClip) -> tuple[Array, Array, Array]:
-    """Return how much knees are bent, the lines from hip to ankle, and feet, from the joints alone."""
-    joints = clip.skeleton.joints(clip.poses)
-    bent, lines, feet = [], [], []
-    for letter in "lr":
-        hip, knee, ankle, ball = (
-            joints[:, JOINTS.index(letter + end)]
-            for end in ("hipjoint", "femur", "tibia", "foot")
-        )
-        first, second = knee - hip, ankle - knee
-        across = np.linalg.norm(np.cross(first, second), axis=1)
-        bent.append(np.arctan2(across, (first * second).sum(axis=1)))
-        for listed, vector in ((lines, ankle - hip), (feet, ball - ankle)):
-            listed.append(vector / np.linalg.norm(vector, axis=1, keepdims=True))
-    return np.array(bent).T, np.array(lines), np.array(feet)
-
-
-@pytest.mark.parametrize("person", recorded.subjects())
-def test_a_persons_straighter_knee_is_straight_in_one_pose_of_twenty(
-    person: str,
-) -> None:
-    straighter = []
-    turned = []
-    for clip in recorded.clips([person]):
-        bent, lines, feet = legs(clip)
-        less, same_lines, same_feet = legs(clip.straightened)
-        assert (less <= bent + 1e-5).all()
-        # axes of skeletons are stored to 1e-4 degrees
-        np.testing.assert_allclose(lines, same_lines, atol=1e-5)
-        turned.append(np.abs(feet - same_feet).ravel())
-        straighter.append(less.min(axis=1))
-    assert np.quantile(np.concatenate(straighter), recorded.STRAIGHT) < 0.002
-    assert np.quantile(np.concatenate(straighter), 0.9) > 0.1
-    # feet keep their directions exactly if they do not turn inwards or outwards
-    assert np.median(np.concatenate(turned)) < 0.03
-
-
-def test_clips_are_recorded_ones_unless_straight_knees_are_asked_for() -> None:
-    for straight in (False, True):
-        for source in ("library:127", "127_06"):
-            clips = training_clips([source], straight=straight)
-            chosen = recorded.clip("127_06")
-            expected = (chosen.straightened if straight else chosen).motion()
-            assert any(
-                len(motion := clip.motion(recorded.FPS)) == len(expected)
-                and np.array_equal(motion.poses, expected.poses)
-                for clip in clips
-            )
