@@ -436,6 +436,7 @@ def _percent(log: float) -> str:
 @click.option(
     "--against",
     metavar="FILE",
+    type=click.Path(exists=True, dir_okay=False),
     help="The ledger of another tracker, with which all changes are compared.",
 )
 @click.option(
