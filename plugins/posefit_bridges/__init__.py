@@ -1,10 +1,10 @@
 """Optimisers of other libraries for posefit, and posefit's problems for other tools.
 
-`optimisers` gives the optimisers of Nevergrad, Optuna, pycma, pymoo and SciPy an ask
-and a tell. `problems` gives the problems of posefit's suites to IOHexperimenter,
+`optimisers` wraps the optimisers of Nevergrad, Optuna, pycma, pymoo and SciPy for
+posefit. `problems` converts the problems of posefit's suites for IOHexperimenter,
 Nevergrad, OptunaHub and pymoo. `coco` tells COCO's post-processing about the suite. A
-library is imported when it is used; `pip install posefit[NAME]` installs it, but for
-COCO's, which is `cocopp`.
+library is imported when it is used; `pip install posefit[NAME]` installs it, except
+COCO's, which is `pip install cocopp`.
 """
 
 from posefit import hookimpl

@@ -261,7 +261,7 @@ def pycma(
     """pycma's evolution strategy with its built-in handling of the box.
 
     It starts around the prediction with the prediction's spread, or anywhere with
-    `spread`. Where it stops, it starts again.
+    `spread`. When it stops, it starts again.
 
     Settings:
         population_size (lambda): 5 or more, or 0 for the library's choice.

@@ -11,11 +11,11 @@ contours of the body match the masks. The tracker reports the likeliest sequence
 fitted hypotheses, some frames later.
 
 To change what makes a track likely, change `cost_model`; to change what is tried,
-`proposals`. docs/measured/tracker-parts.md tells what each part is worth.
+change `proposals`. docs/measured/tracker-parts.md has the effect of each part.
 
 - `tracker`: the settings.
 - `path`: both cheapest paths, through states of clips and through fitted hypotheses.
-- `cost_model`: what a pose costs in a frame, and what a step between frames costs.
+- `cost_model`: the costs of poses in a frame, and of steps between frames.
 - `frame_costs`: how poses compare with the silhouettes and landmarks of a frame.
 - `proposals`: the states that a frame may be in, and where hypotheses begin.
 - `fits`: fits of hypotheses to contours.

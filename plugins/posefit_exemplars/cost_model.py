@@ -1,4 +1,4 @@
-"""The cost model: what a pose costs in a frame, and what a step between frames costs.
+"""The cost model: the costs of poses in a frame, and of steps between frames.
 
 A cost is the negative logarithm of a likelihood, up to a constant. The tracker first
 finds a path through the poses of clips, and then the likeliest sequence of fitted
@@ -9,8 +9,8 @@ hypotheses. Both are cheapest paths, with these costs:
 | path | its silhouette, landmarks and `yaw_costs` | `ClipSteps.costs` |
 | hypotheses | `HypothesisCosts.of_poses`, landmarks | `HypothesisCosts.of_steps` |
 
-`frame_costs` compares poses with silhouettes and landmarks. What each cost is worth is
-measured by docs/studies/ablate.py.
+`frame_costs` compares poses with silhouettes and landmarks. docs/studies/ablate.py
+measures the effect of each cost.
 """
 
 import math

@@ -4,8 +4,8 @@ A fit may turn every joint. It is pulled to where it began and, if the hypothesi
 continues one of the frame before, to similar poses of clips.
 
 Real masks and fitted bodies are less precise than clean ones. The noisier the masks of
-a single camera are, the less the contours count beside these pulls. Nothing else keeps
-a body from leaning to where the mask is wrong.
+a single camera are, the less the contours count compared with these pulls. Otherwise
+the body would lean to where the mask is wrong.
 """
 
 from collections.abc import Callable

@@ -1,10 +1,10 @@
 """The start `lookup`: poses of clips whose silhouettes resemble the observed ones.
 
-A table holds the silhouettes of some poses of clips, each turned to 24 yaws, as seen by
-a camera that looks straight at the person. The code of a silhouette consists of the
-principal components of its picture of 16 x 16 pixels. One product of a matrix and a
-vector compares an observation with the whole table. The costs of the nearest poses then
-give their weights.
+A table contains the silhouettes of some poses of clips, each turned to 24 yaws, as seen
+by a camera that looks straight at the person. A silhouette is scaled to 16 x 16 pixels,
+and its code is the principal components of this picture. So one product of a matrix and
+a vector compares an observation with the whole table. The costs of the nearest poses
+then give their weights.
 
 After Brand, Shadow puppetry, 1999, and Li, Sun, Chen and Li's references 2 and 3: a
 silhouette suggests a pose, and a search then makes it fit.

@@ -4,11 +4,11 @@ Both advance frame by frame in the same way. `proposals` gives candidates, `cost
 their costs and those of the steps to them, and `markov` the likeliest path so far. A
 frame is reported when enough later frames are known.
 
-The poses of clips are only near the poses of a person whom no clip shows, and one
-silhouette leaves open which way the person leans or faces. So the path through the
-clips gives each frame several hypotheses, which are fitted to the contours of the
-masks. The likeliest sequence of them is reported: a wrong pose may fit one frame, but
-hardly twenty.
+The poses of clips are only similar to those of a person who is not in the library, and
+a single silhouette does not show which way the person leans or faces. So the path
+through the clips gives each frame several hypotheses, which are fitted to the contours
+of the masks. The likeliest sequence of them is reported: a wrong pose may fit one
+frame, but hardly twenty.
 
 After Sminchisescu and Triggs, Kinematic jump processes for monocular 3D human tracking,
 2003.

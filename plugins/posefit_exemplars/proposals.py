@@ -1,9 +1,9 @@
 """Proposals: the states that the path may be in, and where hypotheses begin.
 
-The states of a frame are where the clips of the frame before continue; a few times a
-second they are also states from anywhere, which a look-up of the silhouette suggests.
-Hypotheses begin at the pose of the path, at diverse states, and at reflections of the
-likeliest ones.
+The states of a frame continue the clips of the previous frame. A few times a second,
+states from anywhere are added, which a look-up of the silhouette suggests. Hypotheses
+begin at the pose of the path, at diverse states, and at reflections of the likeliest
+hypotheses.
 """
 
 from dataclasses import replace

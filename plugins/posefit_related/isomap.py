@@ -2,9 +2,9 @@
 
 Q. Wang, G. Xu, H. Ai, Learning object intrinsic structure for robust visual tracking,
 CVPR 2003. Isomap gives training poses coordinates that preserve their geodesic
-distances. It has no way back from coordinates to a pose; a linear model of the nearest
-training poses is used instead. The SAPSO paper calls the lack of a closed-form inverse
-the largest obstacle of manifolds.
+distances. Isomap itself does not map coordinates back to a pose; a linear model of the
+nearest training poses does. The SAPSO paper calls the lack of a closed-form inverse the
+largest obstacle of manifolds.
 
 Interpretations: the weights of the linear model rebuild the coordinates best from those
 of the nearest poses (Roweis and Saul, 2000), damped. A latent is feasible if a training

@@ -6,10 +6,10 @@ the shape contexts of its border points vote for the words of a codebook. Kernel
 regression on rendered training poses gives the pose. In a sequence the predicted pose
 is a second input, since several poses may have the same silhouette.
 
-Interpretations: damped least squares with a kernel at every training pose, where the
-publication prefers the sparse relevance vector machine; a product of kernels of
-silhouette and predicted pose; the histograms of several views side by side. Rendering
-the training poses counts in no frame's budget.
+Interpretations: damped least squares with a kernel at every training pose, instead of
+the sparse relevance vector machine that the publication prefers; a product of kernels
+of silhouette and predicted pose; the histograms of several views side by side. The
+budget of a frame does not include rendering the training poses.
 """
 
 from collections.abc import Iterable, Iterator

@@ -63,9 +63,9 @@ CLIPS = click.option(
 @OUT
 @WORKERS
 def vsmm_command(films: int, out: str | None, workers: int) -> None:
-    """Stepping, waving, jumping jacks and squats, by default and literally.
+    """Track stepping, waving, jumping jacks and squats, by default and literally.
 
-    The experiment of CN101894278.
+    This is the experiment of the patent, CN101894278.
     """
     from posefit_reproduce.vsmm.experiment import Scale
 
@@ -94,9 +94,9 @@ def vsmm_command(films: int, out: str | None, workers: int) -> None:
 def sapso_command(
     clips: str | None, seeds: int, quick: bool, out: str | None, workers: int
 ) -> None:
-    """A walk, a walk with a turn and a run, and the effect of each part of the method.
+    """Track a walk, a walk with a turn and a run, and measure each part of the method.
 
-    The experiments of Acta Automatica Sinica 38(5).
+    These are the experiments of the paper, Acta Automatica Sinica 38(5).
     """
     from posefit_reproduce.sapso.experiment import Scale
 

@@ -1,8 +1,9 @@
 """`vsmm`, a variable-structure multiple-model tracker: CN101894278 (2010).
 
 Rules find joints in the silhouette, and filters with motion models track them in
-milliseconds per frame. It works while one of its models describes the motion: walking,
-arms held out, jumping jacks, jumps, squats. The modules, by the steps of the patent:
+milliseconds per frame. The tracker works as long as one of its models describes the
+motion: walking, arms held out, jumping jacks, jumps, squats. These modules implement
+the steps of the patent:
 
 - 1: `preprocess`, the outline and the skeleton line of a mask.
 - 2: `joints`, detects 17 points of the body and predicts hidden ones.

@@ -55,7 +55,7 @@ def _paths(
 ) -> Iterator[tuple[str, str]]:
     """Yield name and full path of all commands below one, outer commands last.
 
-    In a dictionary of these pairs, an outer command so wins over an inner one.
+    So in a dictionary of these pairs an outer command wins over an inner one.
     """
     if isinstance(command, click.Group):
         for name in command.list_commands(context):

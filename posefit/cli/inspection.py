@@ -130,7 +130,7 @@ def diagnosis(
         if state == "empty":
             cause = (
                 "registers nothing: a hook such as posefit_register_optimisers "
-                "must have the mark @hookimpl"
+                "needs the decorator @hookimpl"
             )
         release = f"{plugin.distribution} {plugin.version}"
         lines.append(f"{state:8}  {plugin.name} ({release}): {cause}")

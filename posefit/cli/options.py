@@ -204,7 +204,7 @@ EXTRACTION = (
     _video(
         "--background",
         metavar="A:B|IMAGE",
-        help="Frames without the person, or an image.",
+        help="Frames without the person, or an image of the empty scene.",
     ),
     _video(
         "--roi",
@@ -215,7 +215,7 @@ EXTRACTION = (
     _video(
         "--ignore",
         metavar="IMAGE",
-        help="Bright pixels are ignored, such as a tree in front.",
+        help="Image whose bright pixels are ignored, such as a tree in front.",
     ),
     _video(
         "--width",

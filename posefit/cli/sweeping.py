@@ -118,7 +118,7 @@ def report(
     as_json: bool,
     **others: Any,
 ) -> None:
-    """Write the results of sweeps in DIR as one page that any browser opens, offline.
+    """Write the results of sweeps in DIR as a page that any browser opens, offline.
 
     Each DIR is a folder of ledgers (.sqlite), or one ledger.
 
@@ -155,7 +155,7 @@ def _names(texts: tuple[str, ...]) -> list[str]:
 def rerun(ledger: str, key: str, out: str | None, as_json: bool) -> None:
     """Run one row of the results in DIR again, and print the figures that differ.
 
-    KEY is the row's key in the report, or enough of its first digits.
+    KEY is the row's key in the report, or its first digits.
     The exit status is 1 if a figure other than a time differs.
     """
     from posefit.report import repeat

@@ -114,7 +114,7 @@ class Flagged(NamedTuple):
     """The frames that are called lost, or whose sides are called unknown."""
 
     frames: NDArray[np.bool_]  # (T,)
-    known: int  # the number of frames that it is known of
+    known: int  # the number of frames for which it is known
 
 
 def flagged(table: Table, name: str) -> Flagged | None:
@@ -128,7 +128,7 @@ def flagged(table: Table, name: str) -> Flagged | None:
         name: `lost` or `unknown_sides`.
 
     Returns:
-        The frames, or None if it is known of no frame.
+        The frames, or None if it is unknown for every frame.
     """
     least = {"lost": LOST, "unknown_sides": 1.0}[name]
     known = (table["usable"] == 1.0) & np.isfinite(table[name])
@@ -159,7 +159,7 @@ def evaluated(
 
     - `mean_pose` is the mean of the training poses.
     - `persistence` is the true pose of the first frame.
-    - `nearest` is the training pose of least cost in each frame.
+    - `nearest` is the training pose with the lowest cost in each frame.
 
     `prior_floor_degrees` is the error of the truth projected into the prior. It is a
     lower limit only for a linear prior.
@@ -379,7 +379,7 @@ def mean_known(values: Array) -> float | None:
 def nearest(
     scene: Scene, training: Array, k: int, observation: Observation, beta: float = BETA
 ) -> Array:
-    """Return the training pose of least cost in a frame.
+    """Return the training pose with the lowest cost in a frame.
 
     With more than 8,000 training poses, every fourth is first compared in a picture a
     quarter as large. Only the best 200 of these and their neighbours in the clips are

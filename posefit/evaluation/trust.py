@@ -325,9 +325,9 @@ class Trust:
     )
     training_mm: float | None = _sign(
         (0.0, 60.0, 200.0),
-        "with one camera, depth follows the motions learned from, and the nearest is "
+        "with one camera, depth follows the training motions, and the nearest is "
         "{training_mm:.0f} mm away",
-        "{training_mm:.0f} mm from the motions learned from",
+        "{training_mm:.0f} mm from the training motions",
     )
     lost: float | None = _sign(
         (0.0, 0.15, 0.5),
@@ -343,7 +343,7 @@ class Trust:
         (0.0, 0.25, 0.6),
         "the person is mostly hidden in {hidden:.0%} of the frames between the first "
         "and the last that show them",
-        "hidden in between {hidden:.0%}",
+        "hidden {hidden:.0%}",
     )
     cropped: float | None = _sign(
         (0.0, 0.25, 0.6),

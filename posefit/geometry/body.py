@@ -78,7 +78,7 @@ class Body:
 
     @property
     def stature(self) -> float:
-        """The height in metres, with straight upright legs and the rest as at rest."""
+        """The height in metres of the body at rest, with straight, upright legs."""
         skeleton = self.skeleton
         index = BONES.index
         joints = skeleton.joints(np.zeros(ANGLES))

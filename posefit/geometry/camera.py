@@ -180,7 +180,7 @@ class Camera:
     def framing(
         cls, points: Array, radii: Array, azimuth: float, size: tuple[int, int]
     ) -> "Camera":
-        """Return the nearest camera that sees some balls, with a margin.
+        """Return the nearest camera that sees all of some balls, with a margin.
 
         It aims at the middle of the bounding box of the balls' centres.
 

@@ -3,8 +3,8 @@
 LANES poses are processed at a time, side by side in vector registers. All their numbers
 are in one flat array: LANES values of one quantity, then LANES values of the next.
 Because the compiler knows these offsets, it sees that rows do not overlap, and keeps
-loops over lanes in registers. For rows at unknown offsets it would compare the
-addresses first, and would do so only for loops of 16 and more.
+loops over lanes in registers. If it did not know them, it would have to compare
+addresses first, and would use registers only in loops of 16 and more.
 """
 
 import math

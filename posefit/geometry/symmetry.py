@@ -1,11 +1,10 @@
 """Poses with nearly the same silhouette: left and right exchanged, turned, reflected.
 
-A silhouette shows neither which leg is in front nor the depth of anything. A search
-that has chosen the wrong one of two such poses keeps it, because each frame continues
-the last, unless a tracker tries the other pose. These functions take poses (n, 66),
-leave the roots where they are, and undo themselves when they are applied twice. The
-bones of the two sides are seldom equally long, so the silhouettes differ as much as the
-sides do.
+A silhouette shows neither depth nor which leg is in front. A search that has chosen the
+wrong one of two such poses stays with it, because each frame continues the last, unless
+a tracker tries the other pose. These functions take poses (n, 66) and leave the roots
+where they are; applied twice, they give the original poses. The bones of the two sides
+are seldom equally long, so the silhouettes differ as much as the sides do.
 """
 
 from collections.abc import Sequence

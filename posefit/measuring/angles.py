@@ -1,9 +1,9 @@
 """Clinical joint angles, in degrees: of hip, knee and ankle, of shoulder and elbow.
 
-Each is zero in the anatomical position, and has the same sign on both sides of the
-body. `posefit.measuring.segments` defines the axes. The shoulder's plane and rotation
-are undefined if the arm hangs straight down, like longitudes at a pole; near that pose
-they are left out.
+All angles are zero in the anatomical position, and have the same sign on both sides of
+the body. `posefit.measuring.segments` defines the axes. The shoulder's plane and
+rotation are undefined if the arm hangs straight down, like the longitude at a pole;
+near that pose they are left out.
 """
 
 from collections.abc import Iterator
@@ -64,8 +64,8 @@ def _columns() -> Iterator[str]:
 COLUMNS = tuple(_columns())
 # mirrors left and right, in segments' axes
 _ACROSS = np.diag([1.0, 1.0, -1.0])
-# degrees between an arm and its straight-down or straight-up pose: so near, an error of
-# 2 degrees turns the plane by more than ten
+# degrees between an arm and its straight-down or straight-up pose: nearer than this, an
+# error of 2 degrees turns the plane by more than ten
 NEAR_POLE = 10.0
 _LEVEL = 1e-9  # sine of an elevation below which its plane is not determined
 

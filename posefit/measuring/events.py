@@ -17,7 +17,7 @@ from posefit.measuring.centres import PLACES
 from posefit.measuring.segments import FORWARDS, SIDES
 from posefit.motion.motion import Motion
 
-# hertz: a walk has hardly anything above it. Winter, Biomechanics and motor control,
+# hertz: a walk has hardly any motion above it. Winter, Biomechanics and motor control,
 # 2009
 CUTOFF_HZ = 6.0
 MIN_FPS = 2.0 * CUTOFF_HZ  # frames per second: the Nyquist rate

@@ -139,7 +139,7 @@ def gait_of(motion: Motion, unknown: Collection[int] = ()) -> Gait:
 
     Args:
         motion: the motion.
-        unknown: numbers of frames that count for nothing, such as held or lost ones.
+        unknown: numbers of frames to ignore, such as held or lost ones.
 
     Returns:
         The gait, with `why` if it has no figures.
@@ -416,7 +416,7 @@ def walks_backwards(motion: Motion, unknown: Collection[int] = ()) -> NDArray[np
 
     Args:
         motion: the motion.
-        unknown: numbers of frames that count for nothing.
+        unknown: numbers of frames to ignore.
     """
     count = len(motion)
     half = max(round(0.5 * TRAVEL_SECONDS * motion.fps), 1)
@@ -448,6 +448,5 @@ def backwards_warning(back: NDArray[np.bool_]) -> str:
         return ""
     return (
         f"the person seems to walk backwards in {back.sum()} of {len(back)} frames: "
-        "expected to face the direction of travel; "
-        "if they do, the track faces the wrong way there"
+        "if they walked forwards, the track faces the wrong way there"
     )

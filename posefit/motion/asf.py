@@ -37,7 +37,7 @@ from posefit.reading import check_size, quoted
 
 SIZE_LIMIT = 1_000_000  # bytes; CMU's files have 7,000
 ROOT_CHANNELS = ("TX", "TY", "TZ", "RX", "RY", "RZ")
-# parents of bones of which a Skeleton knows only the channels
+# bones that a Skeleton knows only by their channels, and their parents
 _FINGERS = {
     "lfingers": "lhand",
     "lthumb": "lwrist",
@@ -64,9 +64,9 @@ class Acclaim(NamedTuple):
 def parse_asf(path: str | Path, unit: Unit | None = None) -> Acclaim:
     """Return the content of an .asf file.
 
-    If the stated unit gives a person of an impossible stature, and a known unit gives a
-    plausible one, the latter is taken, and a note says so. Bones other than the 26 of
-    `posefit.geometry.skeleton.BONES` are kept in `channels` only.
+    If the stated unit makes the person impossibly tall or small, and a known unit gives
+    a plausible height, that unit is taken, and a note says so. Bones other than the 26
+    of `posefit.geometry.skeleton.BONES` are kept in `channels` only.
 
     Args:
         path: the file.
@@ -97,7 +97,7 @@ def parse_asf(path: str | Path, unit: Unit | None = None) -> Acclaim:
     stature = Body.of(stated).stature
     if unit is None and not STATURES[0] <= stature <= STATURES[1]:
         guess = unit_of(stature / metres)
-        came = f"{path}: the length that it states makes a person of {stature:.2f} m"
+        came = f"{path}: in the unit that it states, the person is {stature:.2f} m tall"
         if guess is not None:
             wanted = metres_of(guess)
             came += (

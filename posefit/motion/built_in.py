@@ -5,9 +5,9 @@ Every kind has styles, each from another person: `walk-a`, `walk-b`, ... The kin
 `squat`, `jump`, `step` (walking on the spot), and `arms-out` and `wave` (walking with
 both arms held out, or with one waving).
 
-A name without a letter is the mean of the kind's styles, aligned in phase. The prior of
-`walk` has seen all the styles that `walk` is the mean of. A style such as `walk-a` is
-harder: its prior is trained on other people only.
+A name without a letter is the mean of the kind's styles, aligned in phase. So `walk` is
+easy to track: its prior is trained on all the styles of which it is the mean. A style
+such as `walk-a` is harder, because its prior is trained on other people only.
 
 The motions were fitted to CMU clips by `docs/studies/make_motions.py`; arms held out or
 waving were added by hand. The data used in this project was obtained from
@@ -101,7 +101,7 @@ def motion(
     speed: float = 1.0,
     phase: float = 0.0,
 ) -> Motion:
-    """Return a built-in motion. It goes along +z, and passes the origin halfway.
+    """Return a built-in motion. The person moves along +z, past the origin halfway.
 
     The lowest joint of the cycle is about 3 cm above the ground y = 0, as much as a toe
     is thick; a mean of styles may be 2 cm off.
@@ -110,7 +110,7 @@ def motion(
         name: one of `names()`.
         frames: number of frames.
         fps: frames per second.
-        speed: factor of the cadence, and of the pace with it.
+        speed: factor of the cadence and of the speed over the ground.
         phase: where in its cycle the motion starts, in cycles.
 
     Raises:

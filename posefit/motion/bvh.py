@@ -134,12 +134,12 @@ def read_bvh(
     if result.filled:
         notes.append(
             f"{path}: the file lacks {', '.join(result.filled)}; "
-            "they are an average person's, at rest"
+            "an average person's are added, at rest"
         )
     if result.off * metres > MISSED:
         off = f"{1e3 * result.off * metres:.1f} mm off"
         notes.append(
-            f"{path}: bones change their lengths or fork; joints are up to {off}"
+            f"{path}: bones change their length or fork, so joints are up to {off}"
         )
     return Motion(
         path.stem,

@@ -49,7 +49,7 @@ RECOGNISED = FileOptions()
 
 @dataclass(frozen=True)
 class SourceClip:
-    """A motion that can be had at any rate.
+    """A motion that can be sampled at any rate.
 
     Attributes:
         motion: `clip.motion(fps)` makes the motion.

@@ -187,12 +187,12 @@ def clips(
 
 
 def is_library(name: object) -> bool:
-    """Return whether a name is the library's, with or without people behind it."""
+    """Return whether a name means the library, such as `library` or `library:-16`."""
     return isinstance(name, str) and name.partition(":")[0] == LIBRARY
 
 
 def named(name: str) -> Sequence[RecordedClip]:
-    """Return the clips that a name of the library means.
+    """Return the clips for which a name of the library stands.
 
     Args:
         name: `library`; `library:02,16` for some people; `library:-16` for all but

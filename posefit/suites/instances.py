@@ -1,9 +1,9 @@
 """The instances of a suite's functions: a person, a pose, cameras and silhouettes.
 
 An instance's number means the same person, pose and view in every dimension of a
-function, as far as its box holds the pose; see `posefit.motion.instances`. The people
-are from the library: seven in training instances, and in the others three who are in no
-training data.
+function, as far as its box contains the pose; see `posefit.motion.instances`. The
+people come from the library: seven in training instances, and three others, who are in
+no training data, in the rest.
 """
 
 from collections.abc import Callable, Sequence

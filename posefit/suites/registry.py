@@ -1,7 +1,7 @@
 """The suite in the form of IOHexperimenter's registry, which leaderboards read.
 
-The form is schema 1 of `ioh.registry()` in ioh 0.4.2. In addition a problem has the
-`dimensions` in which it exists, and a `summary`.
+The form is schema 1 of `ioh.registry()` in ioh 0.4.2. In addition, each problem lists
+the `dimensions` in which it exists, and has a `summary`.
 """
 
 from typing import Any
@@ -15,7 +15,7 @@ STANDARD_INSTANCES = 15  # the first held-out instances, as in plans
 
 
 def suite_registry() -> dict[str, Any]:
-    """Return the registry of the numbered benchmark, as values that JSON has.
+    """Return the registry of the numbered benchmark, as values for JSON.
 
     >>> problem = suite_registry()["suites"]["posefit-2026.3"]["problems"][0]
     >>> problem["name"], problem["bounds"]

@@ -1,9 +1,10 @@
 """Runs of an optimiser, or of any loop, on problems of a suite, and scores of runs.
 
-A score is of runs with the same method, function, dimension, budget and treatment of
-infeasible proposals. It has the share of reached targets, and expected running times.
+A score summarises the runs with the same method, function, dimension, budget and
+treatment of infeasible proposals. It has the share of targets that were reached, and
+expected running times.
 
-Each instance has different targets, from 32 to 0.25 above the cost of its true pose.
+The targets of an instance are from 32 to 0.25 above the cost of its true pose.
 Hansen et al., COCO: a platform for comparing continuous optimizers in a black-box
 setting, 2021.
 """
@@ -206,9 +207,9 @@ class SuiteScore:
         above: The median of the best costs above the true poses'. It is below 0 if
             searches find lower costs.
         reached: The share of runs and targets that were reached.
-        running_times: The expected evaluations to a cost so much above the true pose's,
-            None for never. All functions together have none, because the hardest
-            function would decide their mean.
+        running_times: The expected evaluations until the cost is this much above the
+            true pose's, None for never. All functions together have none, because the
+            hardest function would decide their mean.
     """
 
     method: str

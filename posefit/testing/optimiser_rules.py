@@ -188,7 +188,7 @@ def dtype(case: Case) -> None:
 
 
 def box(case: Case) -> str:
-    """Every proposal is in [-1, 1]^d, also for a start at the edge or periodic axes."""
+    """Every proposal is in the box, even for a start at the edge or periodic axes."""
     case.valid(Toy(6, wrapping=2), lambda x: 1.0 - np.abs(x[:, 0]), 12)
     case.valid(
         Toy(5, start=Start(np.ones(5), np.full(5, 0.5), np.full(5, 0.3))), sphere
@@ -357,9 +357,9 @@ def inputs(case: Case) -> None:
         optimiser.tell(proposals, values)
         expect(
             same_proposals(),
-            "tell must not modify its proposals, got others afterwards",
+            "tell must not modify its proposals, but did",
         )
-        expect(same_costs(), "tell must not modify its costs, got others afterwards")
+        expect(same_costs(), "tell must not modify its costs, but did")
 
 
 def copies(case: Case) -> None:
@@ -419,8 +419,8 @@ def next_frame(case: Case) -> str:
     chance = sphere(draw_population(space, np.random.default_rng(0), 1000)).mean()
     expect(
         near < 0.7 * chance,
-        f"particles must be carried, got a mean cost of {near:.3g} "
-        f"where chance has {chance:.3g}",
+        f"particles must be carried, got a mean cost of {near:.3g}; "
+        f"random particles have {chance:.3g}",
     )
     return f"mean cost {near:.3g}, by chance {chance:.3g}"
 

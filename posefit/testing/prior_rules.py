@@ -208,11 +208,11 @@ def same_bits(case: Case) -> None:
         expect(
             same,
             "inverse_transform must give a row the same bits with any other rows, "
-            "got others",
+            "but did not",
         )
         expect(
             np.array_equal(prior.feasible(latents[rows]), feasible[rows]),
-            "feasible must not depend on other rows",
+            "feasible must not depend on other rows, but does",
         )
 
 
@@ -232,10 +232,10 @@ def inputs(case: Case) -> None:
     latents = case.latents
     prior.transform(angles), prior.inverse_transform(latents), prior.feasible(latents)
     same = case.first.inputs_unchanged and np.array_equal(angles, walking_angles())
-    expect(same, "joint angles must not change, got others")
+    expect(same, "the methods must not modify joint angles, but did")
     expect(
         np.array_equal(latents, case.latents),
-        "latents must not change, got others",
+        "the methods must not modify latents, but did",
     )
 
 

@@ -150,7 +150,7 @@ def overlap(case: Case) -> str:
 def same_again(case: Case) -> None:
     """The same film gives the same masks."""
     same = np.array_equal(case.masks, case.use_fully())
-    expect(same, "two segmenters of one film must give the same masks, got others")
+    expect(same, "two segmenters of one film must give the same masks, but did not")
 
 
 def inputs(case: Case) -> None:

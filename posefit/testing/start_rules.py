@@ -127,11 +127,11 @@ def inputs(case: Case) -> None:
     task, (observation, *_) = images()
     same = unchanged(observation.silhouettes[0].mask, task.anchor)
     case.build().posterior(observation)
-    expect(same(), "observations and task must not change, got others")
+    expect(same(), "the start must not modify observations or task, but did")
 
 
 def gain(case: Case) -> str:
-    """Populations drawn from its modes have a cheaper best than uniform ones."""
+    """Populations sampled from its modes have a lower best cost than uniform ones."""
     task, observations = images()
     prior = principal(walking_angles())
     space = SearchSpace(

@@ -181,7 +181,7 @@ def inputs(case: Case) -> None:
     """The tracker does not modify observations or task."""
     expect(
         case.first.inputs_unchanged,
-        "observations and task must not change, got others",
+        "the tracker must not modify observations or task, but did",
     )
 
 

@@ -91,7 +91,7 @@ class Recalibration:
                 )
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the constructor's arguments as values that JSON has."""
+        """Return the constructor's arguments as values for JSON."""
         return {
             name: np.round(value, DIGITS).tolist() for name, value in vars(self).items()
         }

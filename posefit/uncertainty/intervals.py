@@ -19,7 +19,7 @@ CLOSE = 1e-3  # spreads; the smallest distance by which anything is divided
 def joint_intervals(
     skeleton: Skeleton, posterior: Posterior, pose: Array, world: bool = False
 ) -> Array:
-    """Return the radii of balls about the joints of a pose that hold the true joints.
+    """Return radii of balls about the joints of a pose that contain the true joints.
 
     A radius is a quantile of the distance to the joint of a random pose of the
     posterior, which has a normal error along each axis. The quantile is multiplied by a
@@ -56,7 +56,7 @@ def joint_intervals(
 
 
 def angle_intervals(posterior: Posterior, pose: Array) -> Array:
-    """Return the intervals of a pose's angles that hold the true angles.
+    """Return the intervals of a pose's angles that contain the true angles.
 
     They are computed in the same way as the radii of `joint_intervals`.
 
@@ -86,7 +86,7 @@ def angle_intervals(posterior: Posterior, pose: Array) -> Array:
 def quantiles(
     distances: Array, weights: Array, spreads: Array, dimensions: Literal[1, 3]
 ) -> Array:
-    """Return the radii that hold certain shares of normal errors about weighted points.
+    """Return radii that contain given shares of normal errors about weighted points.
 
     Args:
         distances: The distances of the points (K, n) from the centres of n balls.

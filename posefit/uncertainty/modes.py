@@ -21,8 +21,8 @@ from posefit.geometry.skeleton import (
 )
 from posefit.uncertainty.calibration import Recalibration
 
-# ours: poses of one mode are at most so far apart, in metres, the mean over joints; a
-# mirrored stride is 0.15 to 0.2 away
+# ours: the largest distance between poses of one mode, in metres, the mean over joints;
+# a mirrored stride is 0.15 to 0.2 away
 APART = 0.1
 DIGITS = 6  # of radians, metres and weights in a file
 ARRAYS = ("poses", "translations", "weights")
@@ -110,7 +110,7 @@ class Posterior:
         return len(self.weights)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the posterior, rounded to a millionth, as values that JSON has.
+        """Return the posterior, rounded to a millionth, as values for JSON.
 
         The modes are not part of the result.
         """
@@ -286,7 +286,7 @@ def clusters_of(
     Args:
         distances: The distances between the points (K, K).
         weights: Their weights (K,).
-        apart: Points are near if they are at most so far apart.
+        apart: The largest distance at which two points count as near.
 
     Returns:
         The weight, the medoid and all rows of each cluster.

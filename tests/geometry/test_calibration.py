@@ -135,7 +135,7 @@ def test_qualisys_third_radial_number_is_opencvs_fifth(tmp_path: Path) -> None:
             TOML.replace("[ 0.1, 0.0, 0.0, 0.0]", "[ 0.1, 0.0, 0.0]"),
             "a distortion of 3 numbers",
         ),
-        ("a.xml", "<calibration>", "XML that is broken"),
+        ("a.xml", "<calibration>", "broken XML"),
         ("a.xml", "<!DOCTYPE a [<!ENTITY b 'c'>]><calibration/>", "document type"),
         ("a.xml", QUALISYS.replace("intrinsic", "lens"), "a camera without intrinsic"),
         (
@@ -187,10 +187,10 @@ HIDDEN = "".join(f"a{k}: &a{k} {{<<: [*a{k - 1}, *a{k - 1}]}}\n" for k in range(
         ("   rows: 3", "   rows: 4", "a matrix of 4 x 3 with 9 numbers"),
         ("   dt: d", "   dt: 99d", "a matrix of the type '99d'"),
         ("data: [", "data: [ [[[1]]],", "where a number should be"),
-        ("---", "--- !!python/object/apply:os.system ['true']", "YAML that is broken"),
+        ("---", "--- !!python/object/apply:os.system ['true']", "broken YAML"),
         # merges are not expanded
         ("image_width", "a0: &a0 {b: 1}\n" + HIDDEN + "image_width", None),
-        ("image_width", "a: " + "[" * 9000 + "\nimage_width", "YAML that is broken"),
+        ("image_width", "a: " + "[" * 9000 + "\nimage_width", "broken YAML"),
         (
             "image_width",
             "# " + "a" * 500_000 + "\nimage_width",
@@ -393,7 +393,7 @@ def test_up_that_is_named_holds_for_our_own_cameras_and_a_guess_is_reported(
     )
     (tmp_path / "a.json").write_text(lying.to_json())
     (one,) = read_calibrations(tmp_path / "a.json")
-    why = "as posefit's own files have it, though z is in their images"
+    why = "as in posefit's own files, although z is up in their images"
     assert guessed_up([one]) == f"+y is up in the cameras' world, {why}"
     np.testing.assert_allclose(
         one.camera((320, 240), upright([one], "z")).rotation, level.rotation, atol=1e-9

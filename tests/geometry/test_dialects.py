@@ -307,7 +307,7 @@ def test_a_pickle_is_refused_with_how_to_convert_it_and_never_read(
     # it would make a file
     path.write_bytes(b"cos\nsystem\n(S'touch " + bytes(tmp_path / "made") + b"'\ntR.")
     with pytest.raises(
-        ValueError, match="got a pickle, .* write it as JSON, json.dump"
+        ValueError, match="got a pickle, .* convert it to JSON: json.dump"
     ):
         read_calibrations(path)
     assert not (tmp_path / "made").exists()
@@ -361,7 +361,7 @@ def test_positions_in_place_of_translations_are_recognised(
         path.write_text(ring(count, height, places=False))
         assert len(read_calibrations(path)) == count
         text = ring(count, height, places=True)
-        assert "seem to be the places of cameras" in refused(tmp_path, text)
+        assert "seem to be the cameras' positions" in refused(tmp_path, text)
 
 
 def placed(turns: Array, moved: Array) -> list[Calibration]:

@@ -120,7 +120,7 @@ def test_a_body_covers_half_of_what_moves() -> None:
         ),
         (
             {"training_mm": 75.0},
-            "doubtful: with one camera, depth follows the motions learned from, and the nearest is 75 mm away",
+            "doubtful: with one camera, depth follows the training motions, and the nearest is 75 mm away",
         ),
         ({"lost": 0.63}, "do not use: the person is lost in 63% of the frames"),
         (
@@ -303,7 +303,7 @@ def test_a_track_by_one_camera_is_doubtful_far_from_what_was_learned() -> None:
     trust = trusted(scene, training=[bent])
     assert trust.training_mm > 60.0
     assert trust.against[0].startswith(
-        "with one camera, depth follows the motions learned from, and the nearest is "
+        "with one camera, depth follows the training motions, and the nearest is "
     )
     assert trust.grade == "doubtful"
     assert trusted(walk(30, (20.0, 110.0)), training=[bent]).training_mm is None

@@ -17,8 +17,8 @@ else the axis that points up in the images of all cameras. Lengths are metres if
 program always writes one unit, and in the file's own unit otherwise; see
 `footage/world.py`.
 
-An unknown key is an error that names the key. Messages of errors complete `expected a
-calibration ..., got ...`.
+An unknown key is an error that names the key. The message of an error completes the
+sentence `expected a calibration ..., got ...`.
 """
 
 from posefit.geometry.calibration.lens import Calibration, pinhole_matrix

@@ -10,7 +10,7 @@ from typing import Any
 
 from posefit.errors import InputError
 from posefit.geometry.calibration.dialect import Dialect
-from posefit.geometry.calibration.keys import check_others
+from posefit.geometry.calibration.keys import check_others, unread
 from posefit.geometry.calibration.lens import Calibration, Place, numbers_of, stated
 from posefit.geometry.calibration.values import Stored, matrix_of
 
@@ -46,15 +46,16 @@ def _tables(
 
 
 def _read(stored: Stored) -> list[Calibration]:
-    return [
-        _camera(name, table)
-        for name, table in _tables(stored.values)
-        if str(table.get("ignore")).lower() != "true"
-    ]
+    calibrations = list[Calibration]()
+    for name, table in _tables(stored.values):
+        # Caliscope keeps cameras in the file that the user has left out
+        if str(table.get("ignore")).lower() != "true":
+            calibrations.append(_camera(name, table))
+    return calibrations
 
 
 def _camera(name: str, table: Mapping[str, Any]) -> Calibration:
-    check_others(name, {key: value for key, value in table.items() if key not in KEYS})
+    check_others(name, unread(table, KEYS))
     # Caliscope writes null for the place of a camera that it has not placed yet
     table = {key: value for key, value in table.items() if value != "null"}
     place: Place | None = None

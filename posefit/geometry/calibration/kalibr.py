@@ -35,29 +35,33 @@ KEYS = {
 
 
 def _recognises(stored: Stored) -> bool:
-    return any(
-        isinstance(table, dict)
-        and (CHAINED in table or "camera_model" in table)
+    for table in stored.values.values():
+        if not isinstance(table, dict):
+            continue
+        if CHAINED not in table and "camera_model" not in table:
+            continue
         # users of OpenCV name a matrix `intrinsics`; Kalibr has four numbers
-        and isinstance(table.get("intrinsics"), list)
-        and len(table["intrinsics"]) == 4
-        for table in stored.values.values()
-    )
+        intrinsics = table.get("intrinsics")
+        if isinstance(intrinsics, list) and len(intrinsics) == 4:
+            return True
+    return False
 
 
 def _read(stored: Stored) -> list[Calibration]:
     tables = {
         name: table for name, table in stored.values.items() if isinstance(table, dict)
     }
+    calibrations = list[Calibration]()
+    # a user added these, in a unit that Kalibr does not state
     if all({"rvec", "tvec"} <= table.keys() for table in tables.values()):
-        return [
-            _camera(name, table, (matrix_of(table["rvec"]), matrix_of(table["tvec"])))
-            for name, table in tables.items()
-        ]
-    return [
-        _camera(name, table, place).of_unit("m")
-        for (name, table), place in zip(tables.items(), _chained(tables), strict=True)
-    ]
+        for name, table in tables.items():
+            place = matrix_of(table["rvec"]), matrix_of(table["tvec"])
+            calibrations.append(_camera(name, table, place))
+        return calibrations
+    places = _chained(tables)
+    for (name, table), chained in zip(tables.items(), places, strict=True):
+        calibrations.append(_camera(name, table, chained).of_unit("m"))
+    return calibrations
 
 
 def _chained(tables: Mapping[str, Any]) -> list[Place | None]:

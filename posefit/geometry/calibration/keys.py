@@ -1,4 +1,4 @@
-"""Unknown keys: whether their names say that they describe the lens or the place.
+"""Unknown keys: whether, by their names, they describe the lens or the place.
 
 The keys that a program writes are listed with its dialect. Users choose names too, or
 add values. An unknown key that holds numbers is an error, unless its name says that
@@ -6,7 +6,7 @@ they describe neither the lens nor the place.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -54,6 +54,11 @@ PROJECTION = "p"  # a matrix (3, 4); with two numbers, the key describes a lens
 _CONVENTION = re.compile(r".*(convention|coordinate|handed|axes|axis).*")
 
 
+def unread(table: Mapping[str, Any], known: Collection[str]) -> dict[str, Any]:
+    """Return the entries of a table whose keys are not known."""
+    return {key: value for key, value in table.items() if key not in known}
+
+
 def check_others(name: str, others: Mapping[str, Any], *, placed: bool = False) -> None:
     """Raise InputError for an unread key that may describe the lens or the place.
 
@@ -78,8 +83,8 @@ def check_others(name: str, others: Mapping[str, Any], *, placed: bool = False) 
             counts(value) or (_CONVENTION.fullmatch(word) and says(value))
         ):
             raise InputError(
-                f"the key {quoted(key)} of {quoted(name)}, which is not known: leave "
-                "it out where it describes neither the lens nor the place"
+                f"the key {quoted(key)} of {quoted(name)}, which is not known: delete "
+                "it if it describes neither the lens nor the camera's position"
             )
 
 
@@ -107,7 +112,6 @@ def _check_suspects(name: str, others: Mapping[str, Any], *, placed: bool) -> No
             and (isinstance(value, dict) or counts(value))
         ):
             raise InputError(
-                f"the key {quoted(key)} of {quoted(name)}, which is not read: where a "
-                "camera stands is its rotation and translation, from the world to the "
-                "camera"
+                f"the key {quoted(key)} of {quoted(name)}, which is not read: give the "
+                "rotation and the translation from the world to the camera"
             )

@@ -257,13 +257,13 @@ def stated(
     check_focal(np.diag(matrix)[:2], size or 2.0 * matrix[:2, 2])
     if abs(matrix[0, 1]) > SKEWED * matrix[0, 0]:
         raise InputError(
-            f"a skew of {matrix[0, 1]:g} pixels, which is not read: pictures must have "
-            "upright pixels"
+            f"a skew of {matrix[0, 1]:g} pixels, which is not read: calibrate without "
+            "skew"
         )
     if size is not None and not cropped and not is_central(matrix, size):
         centre = " and ".join(f"{value:g}" for value in matrix[:2, 2])
         raise InputError(
-            f"a centre of {centre} in pictures of {size[0]}x{size[1]}: it is of "
+            f"a centre of {centre} in pictures of {size[0]}x{size[1]}: it belongs to "
             "pictures of another size"
         )
     rotation, translation = (None, None) if place is None else place

@@ -6,7 +6,7 @@ transform, if it has one, leads from the chunk to metres. The principal point is
 from the middle of the picture, and the centre of the first pixel is 0.5.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -101,16 +101,18 @@ def _camera(name: str, sensor: Any, place: Place, scale: Any) -> Calibration:
     kind = lens.get("type", sensor.get("type", "frame"))
     if kind != "frame":
         raise InputError(f"the lens model {quoted(kind)}, which is not read")
+    values = dict[str, float]()
     for value in lens:
         if value.tag not in CALIBRATION and counts(value.text):
             raise InputError(
                 f"the lens key {quoted(value.tag)} of {quoted(name)}, which is not read"
             )
-    values: Mapping[str, float] = {
-        value.tag: number_of(value.text) for value in lens if value.tag != "resolution"
-    }
+        if value.tag != "resolution":
+            values[value.tag] = number_of(value.text)
     resolution = tag_of(sensor, "resolution")
-    size = np.array([number_of(resolution.get(side)) for side in ("width", "height")])
+    width = number_of(resolution.get("width"))
+    height = number_of(resolution.get("height"))
+    size = np.array([width, height])
     if "f" not in values:
         raise InputError("a calibration without f, of PhotoScan before 1.3")
     focal = [values["f"] + values.get("b1", 0.0), values["f"]]

@@ -16,7 +16,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.geometry.calibration.dialect import Dialect
-from posefit.geometry.calibration.keys import check_others
+from posefit.geometry.calibration.keys import check_others, unread
 from posefit.geometry.calibration.lens import (
     HALF,
     OPENGL,
@@ -31,6 +31,7 @@ from posefit.geometry.calibration.values import (
     counts,
     matrix_of,
     number_of,
+    numbers_at,
     plain,
 )
 from posefit.reading import quoted
@@ -75,35 +76,31 @@ def _recognises(stored: Stored) -> bool:
 
 def _read(stored: Stored) -> list[Calibration]:
     values = stored.values
-    check_others(
-        stored.path.stem,
-        {key: value for key, value in values.items() if key not in FILE_KEYS},
-    )
+    check_others(stored.path.stem, unread(values, FILE_KEYS))
     frames = values["frames"]
     names = _names([str(frame.get("file_path", k)) for k, frame in enumerate(frames)])
     shared = {key: value for key, value in values.items() if key in VIEW_KEYS}
-    return [
-        _camera(name, frame, shared) for name, frame in zip(names, frames, strict=True)
-    ]
+    calibrations = list[Calibration]()
+    for name, frame in zip(names, frames, strict=True):
+        calibrations.append(_camera(name, frame, shared))
+    return calibrations
 
 
 def _names(paths: Sequence[str]) -> list[str]:
     """Return file names without folder and suffix, or the path if two are equal."""
     stems = [PurePosixPath(path).stem for path in paths]
     seen = Counter(stems)
-    return [
-        stem if seen[stem] == 1 else path
-        for stem, path in zip(stems, paths, strict=True)
-    ]
+    names = list[str]()
+    for stem, path in zip(stems, paths, strict=True):
+        # two folders may have a file of the same name
+        names.append(stem if seen[stem] == 1 else path)
+    return names
 
 
 def _camera(
     name: str, frame: Mapping[str, Any], shared: Mapping[str, Any]
 ) -> Calibration:
-    check_others(
-        name,
-        {key: value for key, value in frame.items() if key not in FRAME_KEYS},
-    )
+    check_others(name, unread(frame, FRAME_KEYS))
     if MATRIX not in frame:
         raise InputError(f"the frame {quoted(name)} without {MATRIX}")
     values = {**shared, **frame}
@@ -120,7 +117,7 @@ def _camera(
             raise InputError(f"the lens key {quoted(key)}, which is not read")
     size = None
     if "w" in values and "h" in values:
-        size = [number_of(values["w"]), number_of(values["h"])]
+        size = numbers_at(values, "w", "h")
     return stated(
         name,
         size,
@@ -151,13 +148,11 @@ def _matrix(values: Mapping[str, Any], size: Sequence[float] | None) -> Array:
     known = [length for length in focal if length is not None]
     if not known:
         raise InputError("transforms without fl_x, camera_angle_x or K")
-    centre = [
-        number_of(values.get(f"c{axis}", 0.5 * side)) - HALF
-        for axis, side in zip("xy", size, strict=True)
-    ]
-    return pinhole_matrix(
-        [known[0] if length is None else length for length in focal], np.array(centre)
-    )
+    # a file that states one focal length has square pixels
+    lengths = [known[0] if length is None else length for length in focal]
+    across = number_of(values.get("cx", 0.5 * size[0]))
+    down = number_of(values.get("cy", 0.5 * size[1]))
+    return pinhole_matrix(lengths, np.array([across - HALF, down - HALF]))
 
 
 NERF = Dialect("NeRF's programs", _recognises, _read)

@@ -14,7 +14,7 @@ from posefit.geometry.calibration.values import Stored, matrix_of
 PICKLES = (".pickle", ".pkl")
 # part of the message that refuses a pickle
 HOW = (
-    "a pickle, which may run any code: where you trust it, write it as JSON, "
+    "a pickle, which may run any code: if you trust it, convert it to JSON: "
     "json.dump({key: numpy.asarray(value).tolist() "
     "for key, value in pickle.load(file).items()}, ...)"
 )

@@ -31,6 +31,7 @@ from posefit.geometry.calibration.values import (
     Stored,
     matrix_of,
     number_of,
+    numbers_at,
     plain,
 )
 from posefit.reading import quoted
@@ -105,11 +106,10 @@ def _read(stored: Stored) -> list[Calibration]:
         for name, table in tables:
             table = _whole(table)
             # a camera may be called K or D: its table is not a matrix
-            known = {
-                plain(key): value
-                for key, value in table.items()
-                if not _is_camera(value)
-            }
+            known = dict[str, Any]()
+            for key, value in table.items():
+                if not _is_camera(value):
+                    known[plain(key)] = value
             if _first(known, MATRIX) is not None or _pinhole(known) is not None:
                 cameras.append(_camera(name, table, known))
             elif _first(known, (*LENS, *ROTATION, *SIZE, *SIDES[0][:1])) is not None:
@@ -162,10 +162,8 @@ def _tables(values: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]
             yield str(value.get("name", key)), value
         elif isinstance(value, list):
             tables = (entry for entry in value if isinstance(entry, dict))
-            yield from (
-                (str(table.get("name", f"{key}{number}")), table)
-                for number, table in enumerate(tables)
-            )
+            for number, table in enumerate(tables):
+                yield str(table.get("name", f"{key}{number}")), table
 
 
 def _pinhole(known: Mapping[str, Any]) -> Array | None:
@@ -175,10 +173,7 @@ def _pinhole(known: Mapping[str, Any]) -> Array | None:
     """
     for centre in CENTRES:
         if {*FOCAL, *centre} <= known.keys():
-            return pinhole_matrix(
-                [number_of(known[key]) for key in FOCAL],
-                [number_of(known[key]) for key in centre],
-            )
+            return pinhole_matrix(numbers_at(known, *FOCAL), numbers_at(known, *centre))
     return None
 
 
@@ -193,19 +188,17 @@ def _camera(
     read |= {*TRANSLATION, *FOCAL, *sum(CENTRES, ()), *sum(BOARDS, ())}
     read.add(next((key for key in MATRIX if key in known), ""))
     others = {key: value for key, value in values.items() if plain(key) not in read}
+    # the lens may be numbers with names, in the camera's table or in one of their own
     if lens is None or (isinstance(lens, dict) and "k1" in lens):
-        others |= {
-            key: value
-            for key, value in (lens or {}).items()
-            if plain(key) not in {*numbered, *MODEL}
-        }
+        for key, value in (lens or {}).items():
+            if plain(key) not in {*numbered, *MODEL}:
+                others[key] = value
         lens = [(known if lens is None else lens).get(key, 0.0) for key in numbered]
     size = _first(known, SIZE)
-    sides = (
-        [_first(known, names) for names in SIDES]
-        if size is None
-        else np.ravel(matrix_of(size)).tolist()
-    )
+    if size is None:
+        sides = [_first(known, names) for names in SIDES]
+    else:
+        sides = np.ravel(matrix_of(size)).tolist()
     place = _place(known)
     check_others(name, others, placed=place is not None)
     return stated(

@@ -24,6 +24,7 @@ from posefit.geometry.calibration.values import (
     check_keys,
     matrix_of,
     number_of,
+    numbers_at,
 )
 from posefit.reading import quoted
 
@@ -49,11 +50,10 @@ def _read(stored: Stored) -> list[Calibration]:
     extrinsics = _by_key(stored.values["extrinsics"])
     # the first camera of a model has the model's name and number, the others only the
     # number
-    models = {
-        value["polymorphic_id"] & ~(1 << 31): value["polymorphic_name"]
-        for value in intrinsics.values()
-        if "polymorphic_name" in value
-    }
+    models = dict[int, str]()
+    for value in intrinsics.values():
+        if "polymorphic_name" in value:
+            models[value["polymorphic_id"] & ~(1 << 31)] = value["polymorphic_name"]
     calibrations = list[Calibration]()
     for view in _by_key(stored.values["views"]).values():
         data = view["ptr_wrapper"]["data"]
@@ -85,7 +85,7 @@ def _camera(
     focal = number_of(data["focal_length"])
     return stated(
         name.rpartition(".")[0] or name,
-        [number_of(data[side]) for side in ("width", "height")],
+        numbers_at(data, "width", "height"),
         pinhole_matrix([focal, focal], matrix_of(data["principal_point"])),
         lens,
         place,

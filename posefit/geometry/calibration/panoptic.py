@@ -20,10 +20,10 @@ def _recognises(stored: Stored) -> bool:
 
 
 def _read(stored: Stored) -> list[Calibration]:
-    return [
-        _camera(str(table.get("name", number)), table)
-        for number, table in enumerate(stored.values["cameras"])
-    ]
+    calibrations = list[Calibration]()
+    for number, table in enumerate(stored.values["cameras"]):
+        calibrations.append(_camera(str(table.get("name", number)), table))
+    return calibrations
 
 
 def _camera(name: str, table: Mapping[str, Any]) -> Calibration:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.geometry.calibration.dialect import Dialect
 from posefit.geometry.calibration.lens import (
@@ -36,10 +37,11 @@ INTRINSICS = {
 
 
 def _read(stored: Stored) -> list[Calibration]:
-    return [
-        _camera(camera, camera.get("serial", f"camera {number}"))
-        for number, camera in enumerate(stored.root.iter("camera"))
-    ]
+    calibrations = list[Calibration]()
+    for number, camera in enumerate(stored.root.iter("camera")):
+        name = camera.get("serial", f"camera {number}")
+        calibrations.append(_camera(camera, name))
+    return calibrations
 
 
 def _camera(camera: Any, name: str) -> Calibration:
@@ -54,17 +56,12 @@ def _camera(camera: Any, name: str) -> Calibration:
             f"the key 'viewrotation' of {quoted(name)}, which is not read: calibrate "
             "with views that are not rotated"
         )
-    left, top, right, bottom = (
-        float(view.get(side, "")) for side in ("left", "top", "right", "bottom")
-    )
-    focal, centre = (
-        np.array([float(lens.get(f"{kind}{axis}", "")) / SUBPIXELS for axis in "UV"])
-        for kind in ("focalLength", "centerPoint")
-    )
-    turned = np.array(
-        [[float(place.get(f"r{i}{j}", "")) for j in "123"] for i in "123"]
-    )
-    position = MILLIMETRES * np.array([float(place.get(axis, "")) for axis in "xyz"])
+    left, top, right, bottom = _floats(view, "left", "top", "right", "bottom")
+    focal = _floats(lens, "focalLengthU", "focalLengthV") / SUBPIXELS
+    centre = _floats(lens, "centerPointU", "centerPointV") / SUBPIXELS
+    rows = [_floats(place, f"r{i}1", f"r{i}2", f"r{i}3") for i in "123"]
+    turned = np.array(rows)
+    position = MILLIMETRES * _floats(place, "x", "y", "z")
     return stated(
         name,
         (right - left + 1, bottom - top + 1),
@@ -75,6 +72,10 @@ def _camera(camera: Any, name: str) -> Calibration:
         cropped=True,
         scale="metres",
     )
+
+
+def _floats(tag: Any, *names: str) -> Array:
+    return np.array([float(tag.get(name, "")) for name in names])
 
 
 def _recognises(stored: Stored) -> bool:

@@ -103,15 +103,15 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
         ) from None
     if not calibrations:
         raise InputError(f"{path}: expected a calibration with a camera, got none")
+    if not chosen:
+        return calibrations
     names = [calibration.name for calibration in calibrations]
-    if chosen and chosen not in names:
+    if chosen not in names:
         raise InputError(
             f"{path}: expected the name of a camera, {cut(', '.join(names))}, got "
             f"{quoted(chosen)}"
         )
-    return [
-        calibration for calibration in calibrations if chosen in ("", calibration.name)
-    ]
+    return [calibration for calibration in calibrations if calibration.name == chosen]
 
 
 def dialect_of(file: Stored) -> Dialect:

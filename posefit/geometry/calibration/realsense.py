@@ -10,12 +10,12 @@ import numpy as np
 
 from posefit.errors import InputError
 from posefit.geometry.calibration.dialect import Dialect
-from posefit.geometry.calibration.keys import check_others
+from posefit.geometry.calibration.keys import check_others, unread
 from posefit.geometry.calibration.lens import Calibration, pinhole_matrix, stated
 from posefit.geometry.calibration.values import (
     Stored,
     matrix_of,
-    number_of,
+    numbers_at,
     plain,
 )
 from posefit.reading import quoted
@@ -42,7 +42,7 @@ def _read(stored: Stored) -> list[Calibration]:
 
 
 def _camera(name: str, table: Mapping[str, Any]) -> Calibration:
-    check_others(name, {key: value for key, value in table.items() if key not in KEYS})
+    check_others(name, unread(table, KEYS))
     lens = matrix_of(table.get("coeffs", [0.0] * 5))
     stated_model = table.get("model", "none")
     model = plain(str(stated_model).rpartition(".")[2])
@@ -50,14 +50,11 @@ def _camera(name: str, table: Mapping[str, Any]) -> Calibration:
         raise InputError(f"the lens model {quoted(stated_model)}, which is not read")
     size = None
     if "width" in table and "height" in table:
-        size = [number_of(table[side]) for side in ("width", "height")]
+        size = numbers_at(table, "width", "height")
     return stated(
         name,
         size,
-        pinhole_matrix(
-            [number_of(table[f"f{axis}"]) for axis in "xy"],
-            [number_of(table[f"pp{axis}"]) for axis in "xy"],
-        ),
+        pinhole_matrix(numbers_at(table, "fx", "fy"), numbers_at(table, "ppx", "ppy")),
         np.ravel(lens),
         None,
         fisheye=bool(lens.any()) and LENSES[model],

@@ -56,12 +56,11 @@ def _recognises(stored: Stored) -> bool:
 def _read(stored: Stored) -> list[Calibration]:
     known = _plain(stored)
     name = str(known.get("cameraname") or stored.path.stem)
-    check_keys(
-        {key: value for key, value in stored.values.items() if plain(key) not in KEYS},
-        (),
-        name,
-        "ROS",
-    )
+    others = dict[str, Any]()
+    for key, value in stored.values.items():
+        if plain(key) not in KEYS:
+            others[key] = value
+    check_keys(others, (), name, "ROS")
     model = plain(known["distortionmodel"])
     if model and model not in LENSES:
         raise InputError(
@@ -69,9 +68,9 @@ def _read(stored: Stored) -> list[Calibration]:
         )
     matrix = matrix_of(_first(known, MATRIX))
     lens = _first(known, LENS)
-    sensor = [
-        number_of(_first(known, (f"image{side}", side))) for side in ("width", "height")
-    ]
+    width = number_of(_first(known, ("imagewidth", "width")))
+    height = number_of(_first(known, ("imageheight", "height")))
+    sensor = [width, height]
     matrix, size = _region(known, numbers_of(matrix.reshape(3, 3), (3, 3)), sensor)
     return [
         stated(
@@ -102,9 +101,7 @@ def _region(
     if isinstance(region, dict):
         part = {plain(key): value for key, value in region.items()}
     elif region is not None and counts(region):
-        raise InputError(
-            "the key 'roi', which is not read: x_offset, y_offset, width and height are"
-        )
+        raise InputError("the key 'roi' without x_offset, y_offset, width and height")
     offset = np.array([number_of(part.get(f"{axis}offset", 0)) for axis in "xy"])
     sides = [number_of(part.get(side, 0)) for side in ("width", "height")]
     # a binning of 0 means 1, and sides of 0 mean the whole sensor

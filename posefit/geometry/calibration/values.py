@@ -123,9 +123,8 @@ def matrix_of(value: Any) -> Array:
         *map(number_of, sides if isinstance(sides, list) else [sides]),
         *map(float, filter(None, [match[1]])),
     ]
-    if not all(
-        side.is_integer() and side > 0 for side in shape
-    ) or numbers.size != math.prod(shape):
+    are_sides = all(side.is_integer() and side > 0 for side in shape)
+    if not are_sides or numbers.size != math.prod(shape):
         raise InputError(
             f"a matrix of {' x '.join(f'{side:g}' for side in shape)} with "
             f"{numbers.size} numbers"
@@ -141,6 +140,11 @@ def number_of(value: Any) -> float:
         raise InputError(f"{quoted(value)} where a number should be") from None
 
 
+def numbers_at(table: Mapping[str, Any], *keys: str) -> list[float]:
+    """Return the numbers under some keys, all of which must be there."""
+    return [number_of(table[key]) for key in keys]
+
+
 def _yaml(text: str) -> Any:
     """Parse YAML into texts, lists and dictionaries only; tags are ignored."""
     import yaml
@@ -151,15 +155,16 @@ def _yaml(text: str) -> Any:
         return yaml.load(text, Loader=yaml.BaseLoader)
     except (yaml.YAMLError, RecursionError) as error:
         reason = " ".join(str(error).split()) or "brackets that are nested too deeply"
-        raise InputError(f"YAML that is broken: {reason}") from None
+        raise InputError(f"broken YAML: {reason}") from None
 
 
 def _of_opencv(root: Any) -> dict[str, Any]:
-    return {
-        entry.tag: {part.tag: (part.text or "").strip() for part in entry}
-        or (entry.text or "").strip()
-        for entry in root
-    }
+    values = dict[str, Any]()
+    for entry in root:
+        # a matrix is a tag with tags inside, and everything else is a text
+        parts = {part.tag: (part.text or "").strip() for part in entry}
+        values[entry.tag] = parts or (entry.text or "").strip()
+    return values
 
 
 def _xml_of(text: str) -> Any:
@@ -180,4 +185,4 @@ def _xml_of(text: str) -> Any:
         ) from None
     # ValueError: the text declares an encoding that it does not have
     except (ParseError, ValueError, RecursionError) as error:
-        raise InputError(f"XML that is broken: {error}") from None
+        raise InputError(f"broken XML: {error}") from None

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.geometry.calibration.dialect import Dialect
-from posefit.geometry.calibration.keys import check_others
+from posefit.geometry.calibration.keys import check_others, unread
 from posefit.geometry.calibration.lens import (
     Calibration,
     numbers_of,
@@ -47,20 +47,19 @@ SAMPLES = 50
 def _read(stored: Stored) -> list[Calibration]:
     cameras = list(stored.root.findall("Camera"))
     filming = [camera for camera in cameras if camera.get("SYSTEM") == VIDEO]
-    # a camera that saw nothing during the calibration has no key frame
-    return [
-        _camera(camera, frames[0])
-        for camera in filming or cameras
-        if (frames := camera.findall("KeyFrames/KeyFrame"))
-    ]
+    calibrations = list[Calibration]()
+    for camera in filming or cameras:
+        frames = camera.findall("KeyFrames/KeyFrame")
+        # a camera that saw nothing during the calibration has no key frame
+        if frames:
+            calibrations.append(_camera(camera, frames[0]))
+    return calibrations
 
 
 def _camera(camera: Any, frame: Any) -> Calibration:
     name = str(camera.get("DEVICEID"))
-    for tag, known in ((camera, CAMERA), (frame, FRAME)):
-        check_others(
-            name, {key: value for key, value in tag.items() if key not in known}
-        )
+    check_others(name, unread(camera.attrib, CAMERA))
+    check_others(name, unread(frame.attrib, FRAME))
     size = numbers_of(numbers_in(camera.get("SENSOR_SIZE")), (2,))
     centre = numbers_of(numbers_in(frame.get("PRINCIPAL_POINT")), (2,))
     focal = number_of(frame.get("FOCAL_LENGTH"))
@@ -129,7 +128,7 @@ def _turned_around(radial: ArrayLike, focal: float, reach: float) -> Array:
     off = float(np.abs(straight * ratio - bent).max())
     if not off <= TOLERANCE:
         raise InputError(
-            f"a lens of which OpenCV's numbers are {off:.2g} pixels off, "
+            f"a lens that OpenCV's model does not fit: it is {off:.2g} pixels off, "
             f"{quoted(radial.tolist())}"
         )
     return np.array([k1, k2, 0.0, 0.0, k3, *below])

@@ -22,7 +22,7 @@ from posefit.geometry.calibration.values import (
     Stored,
     check_keys,
     matrix_of,
-    number_of,
+    numbers_at,
 )
 
 KEYS = {"R", "T", "fx", "fy", "cx", "cy", "k", "p"}
@@ -41,8 +41,8 @@ def _read(stored: Stored) -> list[Calibration]:
 
 def _camera(name: str, table: Mapping[str, Any]) -> Calibration:
     check_keys(table, KEYS, name, "VoxelPose")
-    focal = [number_of(table[f"f{axis}"]) for axis in "xy"]
-    centre = [number_of(table[f"c{axis}"]) for axis in "xy"]
+    focal = numbers_at(table, "fx", "fy")
+    centre = numbers_at(table, "cx", "cy")
     radial = np.ravel(matrix_of(table["k"]))
     tangential = np.ravel(matrix_of(table["p"]))
     rotation = numbers_of(matrix_of(table["R"]), (3, 3))

@@ -64,8 +64,8 @@ def guessed_up(calibrations: Sequence[Calibration]) -> str:
         )
     if image_up[1] < LEVEL * np.linalg.norm(image_up):
         return (
-            "+y is up in the cameras' world, as posefit's own files have it, though "
-            f"{axis} is in their images"
+            "+y is up in the cameras' world, as in posefit's own files, although "
+            f"{axis} is up in their images"
         )
     return ""
 
@@ -92,15 +92,17 @@ def check_places(cameras: Sequence[Calibration]) -> None:
     Of random rigs of two cameras, one in 500 is refused wrongly. Of such rigs with
     positions in the file, four in five are recognised if the origin is on the floor.
     """
-    placed = [
-        (camera.rotation, camera.translation)
-        for camera in cameras
-        if camera.rotation is not None and camera.translation is not None
-    ]
-    if len(placed) < 2:
+    turns = list[Array]()
+    moves = list[Array]()
+    for camera in cameras:
+        if camera.rotation is not None and camera.translation is not None:
+            turns.append(camera.rotation)
+            moves.append(camera.translation)
+    # a single camera looks at every point of its axis, which proves nothing
+    if len(turns) < 2:
         return
-    rotations = np.array([rotation for rotation, _ in placed])
-    translations = np.array([translation for _, translation in placed])
+    rotations = np.array(turns)
+    translations = np.array(moves)
     positions = -np.einsum("nji,nj->ni", rotations, translations)
     up = -rotations[:, 1].sum(axis=0)
     if (
@@ -109,8 +111,8 @@ def check_places(cameras: Sequence[Calibration]) -> None:
         and (translations @ up > 0.0).all()
     ):
         raise InputError(
-            "translations that seem to be the places of cameras: T must be -R times "
-            "the place, from the world to the camera"
+            "translations that seem to be the cameras' positions: T must be -R times "
+            "the position, from the world to the camera"
         )
 
 
