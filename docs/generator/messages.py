@@ -12,12 +12,21 @@ _ROW = re.compile(r"^\| `([^`]+)`[^|]*\| (.+) \|$", re.MULTILINE)
 
 
 def page() -> str:
-    """Return a table of messages for each package, as Markdown."""
+    """Return a table of messages for each package, as Markdown.
+
+    A column of advice is added if a message of the package has some.
+    """
     parts = []
     for package, messages in by_package().items():
-        rows = ["| message | module | what to do |", "|---|---|---|"]
+        advice = {text: _advice(text) for text, _ in messages}
+        rows = ["| message | module |", "|---|---|"]
+        if any(advice.values()):
+            rows = ["| message | module | what to do |", "|---|---|---|"]
         for text, module in messages:
-            rows.append(f"| `{text}` | `{module}` | {_advice(text)} |")
+            row = f"| `{text}` | `{module}` |"
+            if any(advice.values()):
+                row += f" {advice[text]} |"
+            rows.append(row)
         parts.append(f"## {package}\n\n" + "\n".join(rows))
     return "\n\n".join(parts) + "\n"
 

@@ -131,12 +131,12 @@ class FrameCosts:
             The reflected poses (cameras n, 66), camera by camera.
 
         """
-        return np.concatenate(
-            [
-                reflected_poses(self.skeleton, poses, facing(view, place))
-                for view in self._views
-            ]
-        )
+        # each camera has its own line of sight, and so its own reflection
+        reflected = []
+        for view in self._views:
+            camera_yaw = facing(view, place)
+            reflected.append(reflected_poses(self.skeleton, poses, camera_yaw))
+        return np.concatenate(reflected)
 
     def mirror_costs(self, pose: Array, place: Array) -> Array:
         """Return the costs of a pose's mirror image and reflections (1 + cameras,).

@@ -149,12 +149,10 @@ class EvidenceMeans:
         `DEFAULTS`.
         """
         self._latest |= values
-        now = np.array(
-            [
-                scale(self._latest.get(name, DEFAULTS.get(name, 0.0)))
-                for name, scale in EVIDENCE.items()
-            ]
-        )
+        scaled = []
+        for name, scale in EVIDENCE.items():
+            scaled.append(scale(self._latest.get(name, DEFAULTS.get(name, 0.0))))
+        now = np.array(scaled)
         self._sums = self._sums * self._decays + now
         self._weight = self._weight * self._decays + 1.0
         return np.concatenate([now, (self._sums / self._weight).ravel()])

@@ -288,6 +288,7 @@ def _check_record(folder: Path, shared: Mapping[str, Any], adding: bool) -> None
         raise InputError(
             f"{file}: not a record of the conditions of runs: choose another folder"
         )
+    # tables may be made again with a newer build, but runs of two builds are not mixed
     if not adding:
         before.pop("build", None)
         now.pop("build")

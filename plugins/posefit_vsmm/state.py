@@ -223,11 +223,12 @@ _SIDES = {
 }
 # ? is l or r
 _SIDES |= {"hip": ("?hipjoint",), "knee": ("?femur",), "foot": ("?foot",)}
-_BETWEEN = _MIDDLE | {
-    f"{side} {name}": tuple(joint.replace("?", side[0]) for joint in joints)
-    for name, joints in _SIDES.items()
-    for side in ("left", "right")
-}
+_BETWEEN = dict(_MIDDLE)
+for _name, _joints in _SIDES.items():
+    for _side in ("left", "right"):
+        _BETWEEN[f"{_side} {_name}"] = tuple(
+            joint.replace("?", _side[0]) for joint in _joints
+        )
 POINTS = tuple(_BETWEEN)
 AT = {name: k for k, name in enumerate(POINTS)}
 # (17, 2) the two joints of each point; the same one twice if the point is a joint

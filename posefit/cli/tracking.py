@@ -122,6 +122,7 @@ def _track_live(
         raise InputError(
             f"SOURCE must be left out with --live, got {' '.join(options['source'])}"
         )
+    # a session always writes the same two files, and cannot be continued
     for name in ("force", "resume", "write", "without_subject"):
         if options[name]:
             flag = name.replace("_", "-")
@@ -163,6 +164,7 @@ def _print(
     if verbose:
         click.echo(table(content))
     else:
+        # the verdict comes first, in a colour, so that a bad track is not overlooked
         first, *others = brief(content)
         if content.trust is None:
             grade = "good"
@@ -302,6 +304,7 @@ def extraction_of(
         value = options.pop(name)
         if value is not None:
             values[name] = value
+    # an option without effect is an error: the user believes that it does something
     if medium not in ("video", "pictures"):
         for name, value in values.items():
             raise useless_for(medium, name, value, "video")
@@ -332,6 +335,7 @@ def without_subjects(train: Sequence[Any], subjects: Sequence[str]) -> list[Any]
     """Return the training motions without some people of the library."""
     from posefit.motion import recorded
 
+    # leaving out somebody who is not there would look like an honest test
     if not any(recorded.is_library(clips) for clips in train):
         raise InputError(
             "without_subject must be given with --train library, "

@@ -260,6 +260,7 @@ def _errors(
     def error_of(poses: Array) -> float:
         return float(metrics.pose_error_degrees(truth, poses).mean())
 
+    # what somebody reaches who does not search: a method has to beat all three
     nearest_poses = []
     for k, observation in enumerate(scene.observations):
         nearest_poses.append(nearest(scene, training, k, observation, beta))
@@ -276,6 +277,7 @@ def _errors(
         trivial_joints = skeleton.joints(trivial_poses, places)
         baselines_mm[name] = float(metrics.mpjpe_mm(true_joints, trivial_joints).mean())
         skills[name] = metrics.skill(means["error_degrees"], baselines[name])
+    # no search in the prior can do much better than the projected truth
     floor = None
     if prior is not None:
         projected = prior.inverse_transform(prior.transform(truth[:, 3:]))
@@ -353,6 +355,7 @@ def _steadiness(scene: Scene, frames: Sequence[Frame]) -> dict[str, Any]:
     joints = scene.motion(frames).joints
     fps = scene.fps
     mean = mean_known(acceleration(joints, fps))
+    # a person who dances accelerates more than one who walks: the ratio allows for it
     ratio = None
     reference = joints  # the joints that decide whether a foot is on the ground
     if scene.truth is not None:
@@ -446,12 +449,14 @@ def anytime_trace(frames: Sequence[Frame]) -> dict[str, list[float]]:
         At most 64 points: `evaluations` of a frame, rising, and the mean best `cost`
         after each.
     """
+    # a held frame has no trace, because it was not searched
     searched = [frame.trace for frame in frames if len(frame.trace)]
     if not searched:
         return {"evaluations": [], "cost": []}
     points = np.unique(np.concatenate([trace[:, 0] for trace in searched]))
     # begin where every frame has a cost
     points = points[points >= max(trace[0, 0] for trace in searched)]
+    # a long search improves less and less often, so points are spaced by ratio
     if len(points) > MAX_TRACE_POINTS:
         wanted = np.geomspace(points[0], points[-1], MAX_TRACE_POINTS)
         points = np.unique(points[np.searchsorted(points, wanted * (1.0 - 1e-12))])

@@ -109,6 +109,7 @@ def read_bvh(
     skeleton = replace(
         result.skeleton, name=path.stem, offsets=result.skeleton.offsets * metres
     )
+    # the file says nothing about most of this, so each guess is reported
     notes = []
     if others:
         followed = quoted(rig.names[rig.joints.hips])
@@ -188,6 +189,7 @@ def _parsed(path: Path) -> tuple[list[_Node], Array, float]:
     lines = lines_of(path, LONGEST_LINE)
     nodes, width = _hierarchy(lines)
     count, frame_time = _head(lines)
+    # an array takes a quarter of the memory of a list of numbers
     data = array("d")
     rows = 0
     for line in lines:
@@ -196,6 +198,7 @@ def _parsed(path: Path) -> tuple[list[_Node], Array, float]:
         rows += 1
         if len(line.words) != width:
             raise line.mistake(f"{width} numbers of frame {rows}", f"{len(line.words)}")
+        # checked here, before a huge file fills the memory
         if rows > LONGEST or rows * width > VALUES:
             raise line.mistake(f"at most {LONGEST} frames and {VALUES} numbers", "more")
         try:

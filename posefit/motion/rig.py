@@ -226,6 +226,7 @@ def retargeted(rig: Rig, up: Array) -> Retargeted:
     thigh_and_shin = [BONES.index("lfemur"), BONES.index("ltibia")]
     average_leg = float(average.lengths[thigh_and_shin].sum())
     legs = [rig.length(side) for side in ("left", "right")]
+    # bones that the rig lacks are an average person's, at the size of this person
     scale = float(np.mean(legs)) / average_leg
     # also true of NaN
     if not scale > 0.0:
@@ -241,6 +242,7 @@ def retargeted(rig: Rig, up: Array) -> Retargeted:
     world[0] = turns[hips] @ rest.root
     at[0] = places[hips]
     poses[:, :3] = root_angles_from_rotation(world[0])
+    # parents come before children, so the frame that a bone starts from is known
     for joint, bone in enumerate(bones, 1):
         above = PARENTS[joint]
         direction = directions[joint - 1]
@@ -262,6 +264,7 @@ def retargeted(rig: Rig, up: Array) -> Retargeted:
         offsets[joint - 1] = direction * length if length else np.zeros(3)
         at[joint] = at[above] + world[joint] @ offsets[joint - 1]
     skeleton = _skeleton(offsets, poses, average)
+    # bones of a rig may change their lengths, but ours cannot: report how far off
     missed = 0.0
     for joint, bone in enumerate(bones, 1):
         if bone.at is not None and joint not in ENDS:

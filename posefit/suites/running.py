@@ -251,6 +251,7 @@ def suite_scores(runs: Iterable[SuiteRun]) -> list[SuiteScore]:
         >>> scores[0].runs
         1
     """
+    # only runs of the same problems under the same rules can be compared
     groups: dict[tuple[int, int, str, int, str], list[SuiteRun]] = {}
     for run in runs:
         for function in (run.function, ALL):

@@ -119,6 +119,7 @@ class Case(PluginCase):
         """Return the lowest cost of a search, for a filter over ten frames."""
         optimiser = self.build(space, seed, evaluations)
         lowest = np.inf
+        # a filter has few generations in a frame, and converges over several frames
         for frame in range(10 if self.next_frame == "carry" else 1):
             if frame:
                 cast(Filter, optimiser).advance(space)
@@ -208,6 +209,7 @@ def hardly_feasible(case: Case) -> str:
 
 def dimensions(case: Case) -> None:
     """The optimiser searches spaces of 1 and of 66 dimensions."""
+    # the smallest space, where a covariance is a number, and that of all joint angles
     for d in (1, 66):
         case.valid(Toy(d), sphere)
 
@@ -255,6 +257,7 @@ def late(case: Case) -> str:
                 cast(Filter, optimiser).advance(BOX)
                 proposals = optimiser.ask()
                 used = 0
+            # the caller would not evaluate a population beyond the budget
             if not len(proposals) or used + len(proposals) > LONG:
                 break
             check_population(proposals, BOX)
@@ -291,6 +294,7 @@ def order(case: Case) -> str:
         means = [sphere(proposals).mean() for proposals, _ in steps]
         return float(np.mean(means[len(means) // 2 :]))
 
+    # shuffled costs are as large as true ones, but belong to other proposals
     good = [last(sphere, seed) for seed in range(3)]
     bad = [last(shuffled, seed) for seed in range(3)]
     # equal bit for bit: the costs had no influence at all

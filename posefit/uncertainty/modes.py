@@ -163,7 +163,7 @@ def modes_of(skeleton: Skeleton, posterior: Posterior) -> list[Mode]:
     clusters = clusters_of(distances, posterior.weights, APART)
     weights = [weight for weight, _, _ in clusters]
     if posterior.recalibration is not None:
-        # temperature scaling
+        # temperature scaling, because the weights of samples are not calibrated
         powers = [weight**posterior.recalibration.sharpness for weight in weights]
         share = (1.0 - posterior.recalibration.none) / sum(powers)
         weights = [share * power for power in powers]
@@ -259,6 +259,7 @@ def track_modes(
     Returns:
         The tracks. There are none unless the posteriors of all frames are coherent.
     """
+    # otherwise row k of different frames would not be one track
     coherent = [frame for frame in posteriors if frame is not None and frame.coherent]
     if len(coherent) < len(posteriors) or len({len(frame) for frame in coherent}) != 1:
         return []
@@ -291,6 +292,7 @@ def clusters_of(
     Returns:
         The weight, the medoid and all rows of each cluster.
     """
+    # a pose between two modes must not be a centre, so the heaviest place comes first
     near = distances <= apart
     remaining = weights > 0.0
     centres: list[int] = []
@@ -346,9 +348,8 @@ def mirrored_gain(targets: Array, joints: Array) -> Array:
     across = joints[:, _LEFT_HIP] - joints[:, _RIGHT_HIP]
     lengths = np.linalg.norm(across, axis=1, keepdims=True)
     across /= np.maximum(lengths, np.finfo(float).tiny)  # (T, 3), unit vectors
-    heights = np.einsum(
-        "tjk,tk->tj", joints, across
-    )  # (T, 27), from the mirror's plane
+    # (T, 27), from the mirror's plane
+    heights = np.einsum("tjk,tk->tj", joints, across)
     mirrored = joints - 2.0 * heights[..., None] * across[:, None]
     counterparts = np.array(MIRROR)[_PAIRED]
     direct = targets[:, _PAIRED] - joints[:, _PAIRED]

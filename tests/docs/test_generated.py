@@ -50,7 +50,7 @@ def test_the_settings_of_every_method_are_described() -> None:
 def test_messages_are_listed_with_their_modules_and_the_advice_of_their_page() -> None:
     page = messages.page()
     assert (
-        "| `... must have shape ..., got ...` | `posefit.arrays.__init__` |  |" in page
+        "| `... must have shape ..., got ...` | `posefit.arrays.__init__` |\n" in page
     )
     assert page.count("\n| `") > 400
     (row,) = re.findall(r"^\| `views must have the same frames.*", page, re.MULTILINE)

@@ -137,7 +137,7 @@ def switching_figures(labels: list[int], arrays: Arrays) -> dict[str, float]:
     probabilities = arrays["probabilities"]
     candidates = arrays["candidate_group"]
     likeliest = probabilities.argmax(axis=1)
-    # by group number + 1
+    # by group number + 1, because -1 stands for no group
     models_of: list[set[int]] = [set()]
     for _, names in GROUPS:
         models_of.append({MODELS.index(name) for name in names})
@@ -145,9 +145,13 @@ def switching_figures(labels: list[int], arrays: Arrays) -> dict[str, float]:
     for group, candidate in zip(arrays["group"], candidates, strict=True):
         in_force.append(models_of[group + 1] | models_of[candidate + 1])
     right = [set(RIGHT[label]) for label in labels]
-    right_group = np.array(
-        [bool(models & wanted) for models, wanted in zip(in_force, right, strict=True)]
-    )
+    # an activity may have several right models; one of them in force is enough
+    group_is_right = []
+    model_is_right = []
+    for models, model, wanted in zip(in_force, likeliest, right, strict=True):
+        group_is_right.append(bool(models & wanted))
+        model_is_right.append(model in wanted)
+    right_group = np.array(group_is_right)
     delays = _delays(labels, right_group)
     activated = []  # the right models of each group that is activated
     for (before, now), wanted in zip(pairwise(candidates), right[1:], strict=True):
@@ -159,10 +163,7 @@ def switching_figures(labels: list[int], arrays: Arrays) -> dict[str, float]:
         terminated.append(bool(before & wanted) and not now & wanted)
     return {
         "dominant": 100.0 * np.mean(probabilities.max(axis=1) > 0.5),
-        "model": 100.0
-        * np.mean(
-            [model in models for model, models in zip(likeliest, right, strict=True)]
-        ),
+        "model": 100.0 * np.mean(model_is_right),
         "group": 100.0 * right_group.mean(),
         "label": 100.0 * np.mean(arrays["label"] == np.array(labels)),
         "delay": max(delays),
