@@ -10,7 +10,7 @@ Several hypotheses per frame start from that path. A fit moves every joint until
 contours of the body match the masks. The tracker reports the likeliest sequence of
 fitted hypotheses, some frames later.
 
-To change what makes a track likely, change `cost_model`; to change what is tried,
+To change what makes a track likely, change `cost_model`; to change the candidates,
 change `proposals`. docs/measured/tracker-parts.md has the effect of each part.
 
 - `tracker`: the settings.

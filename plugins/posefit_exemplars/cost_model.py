@@ -59,7 +59,7 @@ ALONE_LIBRARY_COST = 1.0
 # The cost of a pose fitted to clean masks. If even the best frames cost more, masks or
 # the body are less precise.
 CLEAN_COST = 3.0
-BEST_SHARE = 0.2  # the quantile of costs that stands for the best frames
+BEST_SHARE = 0.2  # the quantile of costs that represents the best frames
 MEMORY_SECONDS = 10.0  # frames longer ago are forgotten
 FITTED_COST_SHARE = 0.4  # estimate of the cost after a fit, before the first one
 

@@ -121,9 +121,9 @@ class Tiles(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Exemplars:
-    """The poses of clips, clip by clip, with what is learned from them.
+    """The poses of clips, clip by clip, and all that is learned from them.
 
-    The yaw of a state is free; its pitch and roll are those of the clip.
+    The yaw of a state is free; its pitch and roll come from the clip.
     """
 
     poses: Array  # (K, 66)
@@ -217,7 +217,7 @@ class Exemplars:
         return length, self.clips * length + self.times
 
     def continuation(self, states: Rows, seconds: float) -> tuple[Codes, Array, Array]:
-        """Return what the clips of some states show `seconds` later.
+        """Return the continuation of some states' clips, `seconds` later.
 
         Values between two poses are interpolated. A clip stays in its last pose after
         its end and, with negative seconds, in its first pose before its beginning.

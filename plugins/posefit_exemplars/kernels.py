@@ -18,7 +18,7 @@ FIRST_DIMENSIONS = 6
 LANES = 32
 TOTAL_BINS = 256  # bins of the histogram of totals
 
-# (n, D): the distance of two codes is that of the joints of their poses, rms, metres
+# (n, D): the distance of two codes is the distance of their poses' joints, rms, metres
 Codes = NDArray[np.float32]
 Rows = NDArray[np.int64]
 

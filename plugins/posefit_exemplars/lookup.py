@@ -206,7 +206,7 @@ class Lookup:
     def nearest(
         self, observation: Observation, count: int, yaw: float | None = None
     ) -> tuple[Rows, Array, float] | None:
-        """Return the states whose silhouettes are most similar to those of a frame.
+        """Return the states whose silhouettes are most similar to a frame's.
 
         Args:
             observation: The silhouettes of the frame.

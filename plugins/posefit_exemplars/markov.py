@@ -1,6 +1,6 @@
 """A hidden Markov model over the frames of the lag window.
 
-The cost of a state is that of its silhouette over a temperature; steps between the
+The cost of a state is its silhouette's cost over a temperature; steps between the
 states of successive frames have costs too. The Viterbi algorithm finds the likeliest
 path, and the forward-backward algorithm the weights of states. Sampled paths are drawn
 from the posterior of the whole clip: the backward messages of the later frames weigh

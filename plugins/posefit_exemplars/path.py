@@ -4,7 +4,7 @@ Both advance frame by frame in the same way. `proposals` gives candidates, `cost
 their costs and those of the steps to them, and `markov` the likeliest path so far. A
 frame is reported when enough later frames are known.
 
-The poses of clips are only similar to those of a person who is not in the library, and
+The poses of clips only resemble the poses of a person who is not in the library, and
 a single silhouette does not show which way the person leans or faces. So the path
 through the clips gives each frame several hypotheses, which are fitted to the contours
 of the masks. The likeliest sequence of them is reported: a wrong pose may fit one
@@ -333,7 +333,7 @@ class HypothesisPath:
     ) -> Iterator[_FittedFrame]:
         """Yield each estimate with its fitted hypotheses, joined to the frame before.
 
-        The evaluations of the estimates include those of the fits.
+        The evaluations of the estimates include the fits.
         """
         before: _FittedFrame | None = None
         latest = Hypotheses.none()

@@ -115,7 +115,7 @@ def check(
     """Check an installed plugin against the rules of its kind.
 
     KIND is optimiser, prior, tracker, start or segmenter.
-    The rules are checked in a separate process; what the plugin prints goes to stderr.
+    The rules are checked in a separate process; the plugin's output goes to stderr.
     Once two rules have failed for the same cause, the others are not checked.
     The exit status is 1 if a rule is broken.
     """

@@ -586,7 +586,7 @@ def _figure(
     """Return a figure, or the reason why it is unknown.
 
     Args:
-        reasons: Whether each reason holds. The first one that does is returned.
+        reasons: Whether each reason holds. The first that does is returned.
         compute: Computes the figure if none of them holds.
         otherwise: The reason if the result is None.
     """

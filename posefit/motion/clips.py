@@ -74,7 +74,7 @@ def clip_of(source: Source, stated: FileOptions = RECOGNISED) -> SourceClip:
 
     Args:
         source: a built-in or recorded motion's name, an .amc or .bvh file, or a motion.
-        stated: what the file does not state.
+        stated: information that the file lacks.
 
     Raises:
         InputError: there is no such motion.
@@ -134,7 +134,7 @@ def load_motion(
     Args:
         source: a built-in or recorded motion's name, an .amc or .bvh file, or a motion.
         fps: frames per second.
-        stated: what the file does not state.
+        stated: information that the file lacks.
 
     Raises:
         InputError: there is no such motion, or unit or up is given for a source that is
@@ -187,7 +187,7 @@ def training_clips(
         sources: each is what `clip_of` takes; or a folder of .amc files with their
             .asf, or of .bvh files; or `library` for all recorded motions,
             `library:02,16` for some people's, `library:-16` for all but some people's.
-        stated: what the files do not state.
+        stated: information that the files lack.
         followed: the motion that is followed. A folder and the library are used
             without it.
 

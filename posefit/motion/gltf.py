@@ -89,7 +89,7 @@ def write_glb(path: str | Path, motion: Motion, radii: Array) -> None:
     document = {
         "asset": {"version": "2.0", "generator": "posefit"},
         "scene": 0,
-        # a skinned mesh is placed by its joints: it is beside them, not below
+        # a skinned mesh is placed by its joints: it is next to them, not below
         "scenes": [{"nodes": [0, body]}],
         "nodes": nodes,
         "skins": [skin],

@@ -192,7 +192,7 @@ def is_library(name: object) -> bool:
 
 
 def named(name: str) -> Sequence[RecordedClip]:
-    """Return the clips for which a name of the library stands.
+    """Return the clips that a library name selects.
 
     Args:
         name: `library`; `library:02,16` for some people; `library:-16` for all but

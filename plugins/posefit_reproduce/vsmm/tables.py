@@ -137,7 +137,7 @@ def switching_figures(labels: list[int], arrays: Arrays) -> dict[str, float]:
     probabilities = arrays["probabilities"]
     candidates = arrays["candidate_group"]
     likeliest = probabilities.argmax(axis=1)
-    # by group number + 1, because -1 stands for no group
+    # by group number + 1, because -1 means no group
     models_of: list[set[int]] = [set()]
     for _, names in GROUPS:
         models_of.append({MODELS.index(name) for name in names})

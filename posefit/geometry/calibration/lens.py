@@ -44,7 +44,7 @@ class Calibration:
     """
 
     name: str
-    # width, height; None if the file does not state them: then those of the pictures
+    # width, height; None if the file does not state them: then the pictures' own
     size: tuple[int, int] | None
     # (3, 3) of the pinhole; a negligible skew is ignored, and the centre of the first
     # pixel is 0, as in OpenCV

@@ -1,7 +1,7 @@
 """Cameras in YAML, JSON, XML or TOML, as users of OpenCV write them.
 
 Users choose the names of the keys, so that many names are read for each value. A key's
-name alone decides what it means; capital letters, and signs between letters, make no
+name alone decides its meaning; capital letters, and signs between letters, make no
 difference. A camera is a table with a camera matrix, or with fx, fy and its centre. A
 file is one camera, or has several in tables or lists. Rotation and translation are from
 the world to the camera.
@@ -188,7 +188,7 @@ def _camera(
     read |= {*TRANSLATION, *FOCAL, *sum(CENTRES, ()), *sum(BOARDS, ())}
     read.add(next((key for key in MATRIX if key in known), ""))
     others = {key: value for key, value in values.items() if plain(key) not in read}
-    # the lens may be numbers with names, in the camera's table or in one of their own
+    # the lens may be numbers with names, in the camera's table or in a separate one
     if lens is None or (isinstance(lens, dict) and "k1" in lens):
         for key, value in (lens or {}).items():
             if plain(key) not in {*numbered, *MODEL}:

@@ -60,7 +60,7 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
 
     Raises:
         InputError: The file is not a calibration, or has no camera of that name. The
-            message names the file and says what is wrong.
+            message names the file and the mistake.
 
     """
     path = Path(path)
