@@ -228,7 +228,7 @@ def test_missing_joints_of_a_rig_are_at_rest_and_reported(tmp_path: Path) -> Non
     motion = read_bvh(write_rig(tmp_path / "rig.bvh", walk, STYLES["vrm"]))
     (note,) = motion.notes
     assert (
-        "the file lacks ltoes, rtoes, upperneck, head, lwrist, lhand, rwrist, rhand; they are"
+        "the file lacks ltoes, rtoes, upperneck, head, lwrist, lhand, rwrist, rhand; an average person's are added"
         in note
     )
     forwards = (
@@ -244,7 +244,7 @@ def test_missing_joints_of_a_rig_are_at_rest_and_reported(tmp_path: Path) -> Non
     path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())  # as some editors save it
     short = read_bvh(path)
     assert (
-        "the file lacks lfoot, ltoes, rfoot, rtoes, lwrist, lhand, rwrist, rhand; they are"
+        "the file lacks lfoot, ltoes, rfoot, rtoes, lwrist, lhand, rwrist, rhand; an average person's are added"
         in short.notes[0]
     )
     above = [
@@ -332,7 +332,7 @@ def test_bones_that_change_their_lengths_are_followed_and_reported(
     motion = read_bvh(path)
     assert 0.0039 < farthest(path, STYLES["lafan1"], motion, 1.0, np.eye(3)) < 0.0045
     assert any(
-        "change their lengths" in note and "4.0 mm" in note for note in motion.notes
+        "change their length" in note and "4.0 mm" in note for note in motion.notes
     )
 
 
