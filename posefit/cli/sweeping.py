@@ -54,7 +54,7 @@ def sweep(
     from posefit.sweep import preview as previewing
     from posefit.sweep.engine import Limits
     from posefit.sweep.plan import Plan
-    from posefit.sweep.pool import cores
+    from posefit.silhouette.sharing import cores
 
     seconds = places.pop("cell_seconds")
     gigabytes = places.pop("cell_gigabytes")

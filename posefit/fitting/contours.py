@@ -365,6 +365,7 @@ def contour_race(
     start: tuple[Array, Array],
     weights: Array,
     cost: Callable[[Array, Array], Array],
+    threads: int = 1,
 ) -> tuple[Array, Array, int]:
     """Return poses (n, 66) and places (n, 3) fitted to a frame's contours in rounds.
 
@@ -377,6 +378,7 @@ def contour_race(
         start: the poses and the places to begin with.
         weights: the precisions (69,) of places and angles, see `precisions`.
         cost: returns the costs (n,) of poses at places. Each counts as an evaluation.
+        threads: number of threads. Does not change the result.
 
     Returns:
         All poses and places, and the number of evaluations. A step counts as 27.
@@ -391,7 +393,9 @@ def contour_race(
             evaluations += len(poses)
             rows = np.argsort(costs, kind="stable")[:remaining]
         here = poses[rows], places[rows]
-        poses[rows], places[rows] = fitted(body, views, here, here[0], weights, scales)
+        poses[rows], places[rows] = fitted(
+            body, views, here, here[0], weights, scales, threads
+        )
         evaluations += int(remaining * len(scales) * STEP_EVALUATIONS)
     return poses, places, evaluations
 

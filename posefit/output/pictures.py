@@ -15,6 +15,7 @@ import numpy as np
 from posefit.files import opencv_name
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
+from posefit.footage.video import ahead
 from posefit.footage.writing import VideoWriter
 from posefit.output.content import Content
 from posefit.output.page import track_document
@@ -101,11 +102,18 @@ def write_pictures(paths: Mapping[str, Path], content: Content) -> list[str]:
     warnings = list[str]()
     writer = video.run(VideoWriter, video.path, scene.fps, painter.size)
     radii = content.intervals.get("joint_radii", repeat(None))
-    pairs = zip(_shown(content, warnings), radii, strict=False)
-    for k, ((frame, observation, picture), spread) in enumerate(pairs):
-        row = {name: float(values[k]) for name, values in table.items()}
+
+    def painted() -> Iterator[tuple[Frame, Observation, Image | None, Image | None]]:
+        """Yield what `_shown` does, with the picture of the body."""
+        pairs = zip(_shown(content, warnings), radii, strict=False)
+        for k, ((frame, observation, picture), spread) in enumerate(pairs):
+            row = {name: float(values[k]) for name, values in table.items()}
+            image = painting.run(painter.add, frame, observation, row, picture, spread)
+            yield frame, observation, picture, image
+
+    # a second core paints the next frames while this one is encoded
+    for frame, observation, picture, image in ahead(painted()):
         page.run(stills.add, frame, observation, picture)
-        image = painting.run(painter.add, frame, observation, row, picture, spread)
         video.run(_write_frame, writer, image)
     video.run(VideoWriter.close, writer)
     summary.failure = painting.failure

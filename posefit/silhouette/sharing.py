@@ -18,6 +18,13 @@ POOL = "posefit"  # the name of the pool's threads, which end with the process
 LEAST_SHARE = 16
 
 
+def cores() -> int:
+    """Return how many processors this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
 @lru_cache
 def parts_of(n: int, threads: int) -> tuple[slice, ...]:
     """Return slices of n rows, of about equal length, enough for each thread."""

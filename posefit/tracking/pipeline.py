@@ -160,7 +160,7 @@ def track_scene(
         smoothing = PoseCount()
         if options.smooth and scene.count > 1:
             with progress.phase("smooth"), smoothing.counting():
-                smoothed = _smoothed(smoothed, method.audit.beta, progress)
+                smoothed = _smoothed(smoothed, task, method.audit.beta, progress)
         if passes > 1:
             again = passes, options.seed, progress
             tracked, smoothed = _cheapest_pass(
@@ -255,7 +255,9 @@ def _of_one_picture(
     return scene, [frame]
 
 
-def _smoothed(tracked: Smoothed, beta: float, progress: Progress) -> Smoothed:
+def _smoothed(
+    tracked: Smoothed, task: Task, beta: float, progress: Progress
+) -> Smoothed:
     """Return a smoothed track, with legs exchanged where smooth ones then fit better.
 
     Legs are only doubtful before one camera, and in footage long enough to judge them.
@@ -266,7 +268,9 @@ def _smoothed(tracked: Smoothed, beta: float, progress: Progress) -> Smoothed:
     usable = sum(observation.usable for observation in scene.observations)
     if len(scene.cameras) > 1 or scene.truth is not None or usable < SHORTEST:
         return smoothed
-    smoothed, exchanged = with_cheapest_legs(tracked.frames, smoothed, beta)
+    smoothed, exchanged = with_cheapest_legs(
+        tracked.frames, smoothed, beta, task.threads
+    )
     if exchanged.any():
         progress.log(
             f"legs exchanged in {exchanged.sum()} frames,"
