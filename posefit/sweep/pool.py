@@ -3,7 +3,6 @@
 Whatever a job does to its process ends with that process.
 """
 
-import multiprocessing
 from collections.abc import Callable
 from multiprocessing import connection
 from typing import Any

@@ -135,7 +135,8 @@ def legs_exchanged(
         exchanged[before:edge] = side
         before = edge
         rows = range(max(edge - reach, 0), min(edge + reach, len(frames)))
-        window = replace(scene, observations=[scene.observations[k] for k in rows])
+        shown = [scene.observations[k] for k in rows]
+        window = replace(scene, observations=shown, count=len(shown))
         earlier = exchanged[rows.start : edge].tolist()
         trials = []
         for later in (side, 1 - side):
