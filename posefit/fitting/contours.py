@@ -85,11 +85,15 @@ class MaskContours:
         traced = [
             _border(observation, view, factor, step) for observation in observations
         ]
-        points, corners, distances = zip(*traced, strict=True)
-        sizes = np.array([part.shape for part in distances])
+        points = [part for part, _, _ in traced]
+        corners = [corner for _, corner, _ in traced]
+        sizes = np.array([distances.shape for _, _, distances in traced])
         fields = np.zeros((len(traced), *sizes.max(axis=0)), dtype=np.float32)
-        for whole, part in zip(fields, distances, strict=True):
-            whole[: part.shape[0], : part.shape[1]] = part
+        # each is dropped once it is copied: together they are as large as the fields
+        while traced:
+            _, _, distances = traced.pop()
+            rows, columns = distances.shape
+            fields[len(traced), :rows, :columns] = distances
         starts = np.cumsum([0, *map(len, points)])
         return cls(
             camera,

@@ -4,6 +4,7 @@ A picture that cannot be made costs a warning, and never the poses.
 """
 
 import errno
+import logging
 from collections.abc import Callable, Iterator, Mapping
 from itertools import repeat
 from pathlib import Path
@@ -27,6 +28,7 @@ from posefit.reading import cut
 from posefit.silhouette.foreground import Image
 
 VIDEO = "overlay.mp4"
+LOGGER = logging.getLogger("posefit")
 _Made = TypeVar("_Made")
 
 
@@ -50,6 +52,8 @@ class _Attempt:
             cause = error.strerror if isinstance(error, OSError) else str(error)
             words = cut(" ".join((cause or "").split()))
             self.failure = words or type(error).__name__
+            # the warning has one line; `--debug` shows where a mistake of ours is
+            LOGGER.debug("%s", self.path, exc_info=True)
             return None
 
     def finish(self) -> str:

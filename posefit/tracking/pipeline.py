@@ -159,6 +159,7 @@ def track_scene(
         elif options.smooth and scene.count > 1:
             with progress.phase("smooth"), smoothing.counting():
                 result = _smoothed(result, task, method.audit.beta, progress)
+            trim_memory()
         if budget.passes > 1:
             tracked, result = _cheapest_pass(
                 task,

@@ -256,6 +256,15 @@ def test_the_method_and_the_training_motions_depend_on_the_source() -> None:
         assert (again.method, again.train) == (expected, train), (source, given)
 
 
+def test_a_track_uses_the_cores_of_the_processor_but_at_most_four(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for cores, threads in ((1, 1), (3, 3), (64, 4)):
+        monkeypatch.setattr(defaults, "cores", lambda cores=cores: cores)
+        assert completed(TrackOptions(), None).threads == threads
+        assert completed(TrackOptions(threads=6), None).threads == 6
+
+
 @each(
     (
         "motion",
