@@ -157,6 +157,7 @@ def track_scene(
             result = _of_one_picture(result, task, method, budget.polishing, progress)
             effort["frames"] = _evaluations(result.frames)
         elif options.smooth and scene.count > 1:
+            trim_memory()
             with progress.phase("smooth"), smoothing.counting():
                 result = _smoothed(result, task, method.audit.beta, progress)
             trim_memory()
