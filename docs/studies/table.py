@@ -21,13 +21,14 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.cli.output import Command, progress, say
 from posefit.evaluation.measures import MEASURES
+from posefit.silhouette.sharing import cores
 from posefit.statistics.means import CONFIDENCE
 from posefit.sweep.cell import run_cell
 from posefit.sweep.command import swept
 from posefit.sweep.engine import Limits
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
-from posefit.sweep.pool import Pool, cores
+from posefit.sweep.pool import Pool
 from posefit_reproduce.jobs import each
 
 Row = Mapping[str, Any]

@@ -16,7 +16,7 @@ from posefit.errors import InputError
 from posefit.fitting.tracker import Task
 from posefit.geometry import symmetry
 from posefit.geometry.rotation import wrapped
-from posefit.geometry.skeleton import JOINTS, Skeleton
+from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
 from posefit.motion.built_in import average_skeleton
 from posefit.motion.motion import Motion
 from posefit_exemplars import kernels
@@ -169,15 +169,20 @@ class Exemplars:
         """Return the states of motions, from the arrays of `learned_from`."""
         counts = learned["counts"]  # per clip; mirror images follow all motions
         ends = np.cumsum(counts)
-        parts = list[tuple[Array, Array, Array]]()
+        # filled clip by clip: a list of all clips would double the memory
+        poses = np.empty((ends[-1], ANGLES))
+        places = np.empty((ends[-1], 3))
+        times = np.empty(ends[-1])
         for number, rows in enumerate(np.split(learned["rows"], ends[:-1])):
             motion = motions[number % len(motions)]
-            poses = motion.poses[rows]
-            places = motion.translations[rows]
+            states = slice(ends[number] - len(rows), ends[number])
+            poses[states] = motion.poses[rows]
+            places[states] = motion.translations[rows]
+            times[states] = rows / motion.fps
             if number >= len(motions):
-                poses, places = _mirrored(motion.skeleton, poses, places)
-            parts.append((poses, places, rows / motion.fps))
-        poses, places, times = map(np.concatenate, zip(*parts, strict=True))
+                poses[states], places[states] = _mirrored(
+                    motion.skeleton, poses[states], places[states]
+                )
         codes = learned["codes"]
         centres = learned["centres"]
         groups = learned["groups"].astype(np.int64)

@@ -104,7 +104,12 @@ class FrameFits:
         `costs` returns the costs (n,) of poses at places.
         """
         poses, places, used = contour_race(
-            self._task.body, self._contours, start, self._weights, costs
+            self._task.body,
+            self._contours,
+            start,
+            self._weights,
+            costs,
+            self._task.threads,
         )
         self.evaluations += used + len(poses)
         return poses, places

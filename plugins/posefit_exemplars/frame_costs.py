@@ -71,7 +71,7 @@ class FrameCosts:
         """
         if self.root is not None or self._task.translation == "known":
             return self.at_root(places)
-        return align(*self._scene, poses, places)
+        return align(*self._scene, poses, places, self._task.threads)
 
     def at_root(self, places: Array) -> Array:
         """Return the known root n times (n, 3), or `places` (n, 3) if it is unknown."""

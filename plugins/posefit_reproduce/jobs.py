@@ -6,8 +6,9 @@ from contextlib import closing
 from typing import Any, TypeVar
 
 from posefit.errors import InputError
+from posefit.silhouette.sharing import cores
 from posefit.sweep.engine import POLL_SECONDS, Limits
-from posefit.sweep.pool import Pool, cores
+from posefit.sweep.pool import Pool
 
 Progress = Callable[[Iterator[Any], int], Iterator[Any]]
 K = TypeVar("K", bound=Hashable)

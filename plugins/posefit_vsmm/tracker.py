@@ -266,7 +266,7 @@ class TrackFilter:
         poses, places = decode(states, self._dependent)
         scene = task.body, task.cameras, observation.silhouettes
         if known is None:
-            places = align(*scene, poses, places)
+            places = align(*scene, poses, places, task.threads)
         else:
             places[:] = known
         costs, _ = pose_costs(*scene, poses, places, threads=task.threads)

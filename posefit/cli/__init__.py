@@ -78,6 +78,13 @@ def main(debug: bool) -> None:
     posefit track video.mp4 --out walker    a person against a still background
     posefit sweep default --out results     compare eight methods
     """  # noqa: D301
+    if debug:
+        import logging
+
+        # also of mistakes that cost a warning only, such as a picture's
+        logger = logging.getLogger("posefit")
+        logger.setLevel(logging.DEBUG)
+        logger.addHandler(logging.StreamHandler())
 
 
 for _command in chain.from_iterable(GROUPS.values()):

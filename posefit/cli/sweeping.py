@@ -50,11 +50,11 @@ def sweep(
     The exit status is 1 if cells were quarantined after three attempts, 130 if the
     sweep was stopped.
     """
+    from posefit.silhouette.sharing import cores
     from posefit.sweep import command
     from posefit.sweep import preview as previewing
     from posefit.sweep.engine import Limits
     from posefit.sweep.plan import Plan
-    from posefit.sweep.pool import cores
 
     seconds = places.pop("cell_seconds")
     gigabytes = places.pop("cell_gigabytes")

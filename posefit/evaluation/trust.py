@@ -20,7 +20,8 @@ from posefit.evaluation.errors import Table, flagged_share, mean_known
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.quality import LAG, changed_pixels, moved_pixels
 from posefit.footage.scene import Scene
-from posefit.geometry.skeleton import Skeleton
+from posefit.geometry.kernels import lessen_distances
+from posefit.geometry.skeleton import JOINTS, Skeleton
 from posefit.geometry.symmetry import facing, mirrored_poses
 from posefit.motion.motion import Motion
 from posefit.motion.steadiness import BALLS, acceleration, runs, standing
@@ -28,7 +29,6 @@ from posefit.reading import counted
 from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask, touches_border
-from posefit.uncertainty.modes import poses_apart
 
 # A smooth path is fitted to the frames within this time before and after a frame.
 SMOOTH_SECONDS = 0.5
@@ -157,16 +157,15 @@ def training_distances(
         The mean distance of the joints (n,) in metres, inf without motions.
     """
     both = np.concatenate([poses, mirrored_poses(skeleton, poses)])
-    nearest = np.full(2 * len(poses), np.inf)
     # a pose is as familiar in any direction
     both[:, 0] = 0.0
+    joints = skeleton.joints(both)
+    nearest = np.full(len(joints), np.inf)
     for motion in training:
         others = motion.poses[:: max(1, round(TRAINING_SECONDS * motion.fps))].copy()
         others[:, 0] = 0.0
-        np.minimum(
-            nearest, poses_apart(skeleton, both, others).min(axis=1), out=nearest
-        )
-    return np.asarray(nearest.reshape(2, -1).min(axis=0))
+        lessen_distances(joints, skeleton.joints(others), nearest)
+    return np.asarray(nearest.reshape(2, -1).min(axis=0)) / len(JOINTS)
 
 
 def explained_share(

@@ -85,11 +85,15 @@ class MaskContours:
         traced = [
             _border(observation, view, factor, step) for observation in observations
         ]
-        points, corners, distances = zip(*traced, strict=True)
-        sizes = np.array([part.shape for part in distances])
+        points = [part for part, _, _ in traced]
+        corners = [corner for _, corner, _ in traced]
+        sizes = np.array([distances.shape for _, _, distances in traced])
         fields = np.zeros((len(traced), *sizes.max(axis=0)), dtype=np.float32)
-        for whole, part in zip(fields, distances, strict=True):
-            whole[: part.shape[0], : part.shape[1]] = part
+        # each is dropped once it is copied: together they are as large as the fields
+        while traced:
+            _, _, distances = traced.pop()
+            rows, columns = distances.shape
+            fields[len(traced), :rows, :columns] = distances
         starts = np.cumsum([0, *map(len, points)])
         return cls(
             camera,
@@ -365,6 +369,7 @@ def contour_race(
     start: tuple[Array, Array],
     weights: Array,
     cost: Callable[[Array, Array], Array],
+    threads: int = 1,
 ) -> tuple[Array, Array, int]:
     """Return poses (n, 66) and places (n, 3) fitted to a frame's contours in rounds.
 
@@ -377,6 +382,7 @@ def contour_race(
         start: the poses and the places to begin with.
         weights: the precisions (69,) of places and angles, see `precisions`.
         cost: returns the costs (n,) of poses at places. Each counts as an evaluation.
+        threads: number of threads. Does not change the result.
 
     Returns:
         All poses and places, and the number of evaluations. A step counts as 27.
@@ -391,7 +397,9 @@ def contour_race(
             evaluations += len(poses)
             rows = np.argsort(costs, kind="stable")[:remaining]
         here = poses[rows], places[rows]
-        poses[rows], places[rows] = fitted(body, views, here, here[0], weights, scales)
+        poses[rows], places[rows] = fitted(
+            body, views, here, here[0], weights, scales, threads
+        )
         evaluations += int(remaining * len(scales) * STEP_EVALUATIONS)
     return poses, places, evaluations
 

@@ -38,6 +38,7 @@ def align(
     silhouettes: Sequence[Silhouette],
     poses: Array,
     anchors: Array,
+    threads: int = 1,
 ) -> Array:
     """Return the translations (n, 3) with which poses fill the silhouettes' boxes.
 
@@ -53,6 +54,7 @@ def align(
         silhouettes: One for each camera.
         poses: The poses (n, 66).
         anchors: Positions (n, 3) of the root in metres, from which the solution starts.
+        threads: Number of threads. Does not change the result.
 
     Returns:
         The translations (n, 3) in metres.
@@ -72,16 +74,20 @@ def align(
         True
     """
     translations = writeable(anchors.copy())
-    move_to_borders(
-        writeable(body.skeleton.joints(poses)),
-        body.joint_radii(),
+    radii = body.joint_radii()
+    views = (
         np.array([camera.rotation for camera in cameras]),
         np.array([camera.translation for camera in cameras]),
         np.array([camera.focal for camera in cameras]),
         np.array([camera.centre for camera in cameras]),
         np.array([silhouette.extent for silhouette in silhouettes]),
-        translations,
     )
+
+    def move(part: slice) -> None:
+        joints = writeable(body.skeleton.joints(poses[part]))
+        move_to_borders(joints, radii, *views, translations[part])
+
+    work_through(parts_of(len(poses), threads), threads, lambda _: (), move)
     return translations
 
 

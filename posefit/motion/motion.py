@@ -57,6 +57,8 @@ class Motion:
     fps: float
     first: int = 0
     notes: tuple[str, ...] = ()
+    # the motion that this one is the reverse of, if it was made so
+    _forwards: "Motion | None" = field(init=False, default=None, repr=False)
 
     def __post_init__(self) -> None:
         for name, columns in (("poses", ANGLES), ("translations", 3)):
@@ -123,10 +125,14 @@ class Motion:
         return replace(self, skeleton=own, poses=unwrapped(poses))
 
     def reversed(self) -> "Motion":
-        """Return the motion backwards."""
-        return replace(
+        """Return the motion backwards. Twice reversed, it is the same object again."""
+        if self._forwards is not None:
+            return self._forwards
+        backwards = replace(
             self, poses=self.poses[::-1], translations=self.translations[::-1]
         )
+        object.__setattr__(backwards, "_forwards", self)
+        return backwards
 
     def resampled(self, fps: float) -> "Motion":
         """Return the motion at another rate, at the times k / fps within it.

@@ -5,6 +5,7 @@ a track is interrupted, because the disk is full or a user stops it, these frame
 kept, and the same track can be resumed from them.
 """
 
+import errno
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -28,6 +29,8 @@ from posefit.output.record import (
 from posefit.progress import WARNING
 from posefit.reading import cut, parsed_json, read_text
 
+# a full disk, a quota, and a limit on the size of files
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 RECORD = "frames.jsonl"
 SUMMARY = "summary.json"
 MAX_SUMMARY_BYTES = 10_000_000
@@ -143,15 +146,24 @@ class OutputFolder(Recorder):
             self._unfinished.close()
         else:
             self._unfinished.remove(_WRITTEN)
-        if isinstance(error, OSError):
+        if isinstance(error, OSError) and (expected := self._expected(error)):
             cause = f"{error.strerror or error}{notice}"
             raise InputError(
-                f"{self.path}: expected room on the disk, got {cause}"
+                f"{self.path}: expected {expected}, got {cause}"
             ) from error
         if notice and isinstance(error, InputError):
             raise InputError(f"{error}{notice}") from error
         if notice:
             self._log(notice[2:])
+
+    def _expected(self, error: OSError) -> str:
+        """Return what was missing if an error is about this folder, or else ""."""
+        if error.errno in NO_ROOM:
+            return "room on the disk"
+        # an error of another file, such as the footage, speaks for itself
+        if str(error.filename).startswith(str(self.building)):
+            return "a place to write to"
+        return ""
 
     def earlier(self) -> tuple[list[Frame], dict[str, Any] | None]:
         """Return the frames recorded before, and the random state after the last."""

@@ -4,6 +4,7 @@ A picture that cannot be made costs a warning, and never the poses.
 """
 
 import errno
+import logging
 from collections.abc import Callable, Iterator, Mapping
 from itertools import repeat
 from pathlib import Path
@@ -15,6 +16,7 @@ import numpy as np
 from posefit.files import opencv_name
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
+from posefit.footage.video import ahead
 from posefit.footage.writing import VideoWriter
 from posefit.output.content import Content
 from posefit.output.page import track_document
@@ -26,6 +28,7 @@ from posefit.reading import cut
 from posefit.silhouette.foreground import Image
 
 VIDEO = "overlay.mp4"
+LOGGER = logging.getLogger("posefit")
 _Made = TypeVar("_Made")
 
 
@@ -49,6 +52,8 @@ class _Attempt:
             cause = error.strerror if isinstance(error, OSError) else str(error)
             words = cut(" ".join((cause or "").split()))
             self.failure = words or type(error).__name__
+            # the warning has one line; `--debug` shows where a mistake of ours is
+            LOGGER.debug("%s", self.path, exc_info=True)
             return None
 
     def finish(self) -> str:
@@ -101,11 +106,18 @@ def write_pictures(paths: Mapping[str, Path], content: Content) -> list[str]:
     warnings = list[str]()
     writer = video.run(VideoWriter, video.path, scene.fps, painter.size)
     radii = content.intervals.get("joint_radii", repeat(None))
-    pairs = zip(_shown(content, warnings), radii, strict=False)
-    for k, ((frame, observation, picture), spread) in enumerate(pairs):
-        row = {name: float(values[k]) for name, values in table.items()}
+
+    def painted() -> Iterator[tuple[Frame, Observation, Image | None, Image | None]]:
+        """Yield what `_shown` does, with the picture of the body."""
+        pairs = zip(_shown(content, warnings), radii, strict=False)
+        for k, ((frame, observation, picture), spread) in enumerate(pairs):
+            row = {name: float(values[k]) for name, values in table.items()}
+            image = painting.run(painter.add, frame, observation, row, picture, spread)
+            yield frame, observation, picture, image
+
+    # a second core paints the next frames while this one is encoded
+    for frame, observation, picture, image in ahead(painted()):
         page.run(stills.add, frame, observation, picture)
-        image = painting.run(painter.add, frame, observation, row, picture, spread)
         video.run(_write_frame, writer, image)
     video.run(VideoWriter.close, writer)
     summary.failure = painting.failure

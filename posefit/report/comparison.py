@@ -14,13 +14,14 @@ from posefit.errors import InputError
 from posefit.progress import interactive
 from posefit.registry import register
 from posefit.report.write import leaderboard_lines, write_report
+from posefit.silhouette.sharing import cores
 from posefit.sweep.cell import run_cell
 from posefit.sweep.command import swept
 from posefit.sweep.drive import Tally
 from posefit.sweep.engine import Limits
 from posefit.sweep.ledger import FILE, Ledger
 from posefit.sweep.plan import Plan
-from posefit.sweep.pool import Pool, cores
+from posefit.sweep.pool import Pool
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -16,6 +16,25 @@ SHARED_PART = 128
 POOL = "posefit"  # the name of the pool's threads, which end with the process
 # poses: with fewer for each, another thread is not worth its overhead
 LEAST_SHARE = 16
+MAX_THREADS = 4  # by default: more hardly help, as the batches of a frame are small
+
+
+def cores() -> int:
+    """Return how many processors this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def default_threads() -> int:
+    """Return the processors that this process may use, at most `MAX_THREADS`.
+
+    OMP_NUM_THREADS, which limits other libraries, limits this number too. Workers of a
+    sweep have it set to 1.
+    """
+    wanted = os.environ.get("OMP_NUM_THREADS", "")
+    limit = int(wanted) if wanted.isdecimal() else MAX_THREADS
+    return max(min(cores(), limit, MAX_THREADS), 1)
 
 
 @lru_cache

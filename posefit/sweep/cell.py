@@ -186,6 +186,7 @@ class TrackCell(Cell):
             if each.name in option_names:
                 values[each.name] = getattr(self, each.name)
         values["settings"] = settings_text(self.settings)
+        values["threads"] = 1  # cells run side by side
         options = TrackOptions(**values)
         result = track_scene(scene, training, completed(options, self.motion))
         assert result.truth is not None

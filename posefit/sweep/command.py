@@ -10,12 +10,13 @@ from pathlib import Path
 from posefit.errors import InputError
 from posefit.progress import bars_shown
 from posefit.reading import counted, cut
+from posefit.silhouette.sharing import cores
 from posefit.sweep.cell import Cell, other_version, run_cell
 from posefit.sweep.drive import Tally, drive
 from posefit.sweep.engine import Engine, Limits
 from posefit.sweep.ledger import FILE, Ledger, Writer
 from posefit.sweep.plan import MAX_CELLS
-from posefit.sweep.pool import Pool, cores
+from posefit.sweep.pool import Pool
 
 SHARDS = "ledger-*-of-*.sqlite"  # matches the names that `file_of` returns
 

@@ -3,8 +3,6 @@
 Whatever a job does to its process ends with that process.
 """
 
-import multiprocessing
-import os
 from collections.abc import Callable
 from multiprocessing import connection
 from typing import Any
@@ -91,10 +89,3 @@ class Pool:
     def _end(self, worker: Worker) -> None:
         worker.end()
         self._workers.remove(worker)
-
-
-def cores() -> int:
-    """Return how many processors this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return multiprocessing.cpu_count()

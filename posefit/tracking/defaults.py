@@ -7,6 +7,7 @@ from posefit.errors import InputError
 from posefit.motion import built_in, recorded
 from posefit.motion.clips import Source
 from posefit.registry import registry
+from posefit.silhouette.sharing import default_threads
 from posefit.tracking.method import DEFAULT_PRIOR, method_names, offers_of
 from posefit.tracking.options import EVALUATIONS, TrackOptions
 from posefit.tracking.restarts import RESTARTS
@@ -65,6 +66,7 @@ def completed(options: TrackOptions, motion: Source | None) -> TrackOptions:
         restarts=restarts if options.restarts is None else options.restarts,
         body_frames=body_frames if options.body_frames is None else options.body_frames,
         smooth=footage if options.smooth is None else options.smooth,
+        threads=options.threads or default_threads(),
     )
     if options.smooth and options.translation == "known":
         raise InputError(

@@ -18,6 +18,7 @@ from posefit.footage.options import SourceOptions
 from posefit.footage.scene import Scene
 from posefit.footage.source import scene_of
 from posefit.footage.uses import check_used
+from posefit.limits import trim_memory
 from posefit.motion import built_in
 from posefit.motion.clips import (
     Source,
@@ -123,6 +124,7 @@ def track(
             if scene.truth is None:
                 seconds, cpu_seconds = (clocks() - start).tolist()
                 scene = replace(scene, reading_seconds=(seconds, cpu_seconds))
+                trim_memory()
         recorder.begin(scene)
         training = training_motions(clips, scene.fps)
         track = track_scene(

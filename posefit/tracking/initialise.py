@@ -55,7 +55,7 @@ def task_of(scene: Scene, options: TrackOptions, training: Sequence[Motion]) -> 
         fps=scene.fps,
         training=training,
         first_pose=first_pose,
-        threads=options.threads,
+        threads=options.threads or 1,
     )
 
 

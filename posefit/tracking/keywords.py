@@ -49,7 +49,7 @@ class _Keywords(TypedDict, total=False):
     hypotheses: int
     smooth: bool | None
     seed: int
-    threads: int
+    threads: int | None
     device: str
 
 

@@ -142,8 +142,12 @@ class TrackOptions(SourceOptions):
     seed: int = whole_option(
         0, "Seed of all random numbers.", 0, heading="Method and budget"
     )
-    threads: int = whole_option(
-        1, "Number of threads. Does not change the result.", 1, identifies=False
+    threads: int | None = whole_option(
+        None,
+        "Number of threads. Does not change the result. Default: the processor's "
+        "cores, at most 4.",
+        1,
+        identifies=False,
     )
     device: str = option(
         "cpu",

@@ -14,7 +14,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -27,6 +27,7 @@ from posefit.footage.device import on_device
 from posefit.footage.scene import Scene
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import geodesic
+from posefit.limits import trim_memory
 from posefit.motion.motion import Motion
 from posefit.output.folder import Recorder
 from posefit.progress import QUIET, Progress
@@ -122,25 +123,25 @@ def track_scene(
         The track, with errors against the truth or signs of trust.
 
     """
-    scene = given = with_notes(on_device(scene, options.device), training)
-    for warning in scene.warnings:
+    given = with_notes(on_device(scene, options.device), training)
+    for warning in given.warnings:
         progress.warn(warning)
-    task = task_of(scene, options, training)
+    described = task_of(given, options, training)
     if options.smooth:
         # SciPy has a BLAS too, and only a loaded BLAS can be limited
         import scipy.linalg  # noqa: F401
     # the matrices of optimisers are small, and BLAS is slower with more threads
     with threadpool_limits(1):
-        method = prepare(options, task)
-        passes = _passes(scene, method, task.evaluations, bool(options.smooth))
-        task = replace(task, evaluations=task.evaluations // passes)
-        polishing = _polish_evaluations(scene, method, task.evaluations, options)
-        task = replace(task, evaluations=task.evaluations - polishing)
+        method = prepare(options, described)
+        budget = _budget(given, method, described.evaluations, options)
+        described = replace(described, evaluations=budget.evaluations)
         with progress.phase("build"):
-            task, shape, start_clocks, effort = initialise(
-                scene, method, task, options, progress
-            )
-            scene = replace(scene, body=task.body, cameras=task.cameras)
+            started = initialise(given, method, described, options, progress)
+        if started.shape is not None:
+            trim_memory()
+        task = started.task
+        scene = replace(given, body=task.body, cameras=task.cameras)
+        effort = started.effort
         # the search before the first frame is in no row of the audit
         method.audit.clear()
         with progress.phase("track"):
@@ -150,47 +151,56 @@ def track_scene(
             tracked = cheapest(scene, hypotheses, task.training)
             effort["frames"] = _evaluations(tracked.frames)
             tracked = _without_spins(scene, task, method, tracked, options, progress)
-        frames = tracked.frames
-        if scene.count == 1 and scene.truth is None:
-            scene, frames = _of_one_picture(
-                scene, task, method, frames, polishing, progress
-            )
-            effort["frames"] = _evaluations(frames)
-        smoothed = Smoothed(scene, frames, shape)
+        result = Smoothed(scene, tracked.frames, started.shape)
         smoothing = PoseCount()
-        if options.smooth and scene.count > 1:
+        if scene.count == 1 and scene.truth is None:
+            result = _of_one_picture(result, task, method, budget.polishing, progress)
+            effort["frames"] = _evaluations(result.frames)
+        elif options.smooth and scene.count > 1:
+            trim_memory()
             with progress.phase("smooth"), smoothing.counting():
-                smoothed = _smoothed(smoothed, method.audit.beta, progress)
-        if passes > 1:
-            again = passes, options.seed, progress
-            tracked, smoothed = _cheapest_pass(
-                task, method, tracked, smoothed, smoothing, *again
+                result = _smoothed(result, task, method.audit.beta, progress)
+            trim_memory()
+        if budget.passes > 1:
+            tracked, result = _cheapest_pass(
+                task,
+                method,
+                tracked,
+                result,
+                smoothing,
+                budget.passes,
+                options.seed,
+                progress,
             )
-        scene, frames, shape = smoothed
-        later = _evaluations(frames) - effort["frames"]
-        later += round(smoothing.poses / len(scene.cameras))
+        later = _evaluations(result.frames) - effort["frames"]
+        later += round(smoothing.poses / len(result.scene.cameras))
         if later:
             effort["later_passes"] = later
-        scene = with_turns(scene, given.cameras)
-        for guess in scene.guesses[len(given.guesses) :]:
+        scene = with_turns(result.scene, given.cameras)
+        for guess in _added(scene.guesses, given.guesses):
             progress.log(guess)
         # evaluating a track is no effort of the method
         with progress.phase("evaluate"), uncounted():
-            taken = clocks() - start_clocks + scene.reading_seconds
+            taken = clocks() - started.start + scene.reading_seconds
             seconds, cpu_seconds = taken.tolist()
             track = evaluate(
                 scene,
-                frames,
+                result.frames,
                 tracked,
-                shape,
+                result.shape,
                 method,
                 task,
                 options,
                 Effort(seconds, cpu_seconds, effort),
             )
-    for warning in track.log.warnings[len(scene.warnings) :]:
+    for warning in _added(track.log.warnings, scene.warnings):
         progress.warn(warning)
     return track
+
+
+def _added(messages: Sequence[str], earlier: Sequence[str]) -> list[str]:
+    """Return the messages that are not among earlier ones."""
+    return [message for message in messages if message not in earlier]
 
 
 def _without_spins(
@@ -220,42 +230,39 @@ def _without_spins(
 
 
 def _of_one_picture(
-    scene: Scene,
-    task: Task,
-    method: Method,
-    frames: list[Frame],
-    polishing: int,
-    progress: Progress,
-) -> tuple[Scene, list[Frame]]:
-    """Return the scene and the frame of a single picture, with all poses it may show.
+    tracked: Smoothed, task: Task, method: Method, polishing: int, progress: Progress
+) -> Smoothed:
+    """Return the track of a single picture, with all poses that it may show.
 
     Args:
-        scene: The scene.
+        tracked: The scene with its only frame.
         task: The task.
         method: The method that tracked it.
-        frames: Its only frame.
         polishing: Evaluations for another search around the poses found; 0 for none.
         progress: Gets a warning if the prior cannot represent the pose.
 
     """
     prior = method.prior
     if prior is None:
-        return scene, frames
-    (frame,) = frames
+        return tracked
+    scene = tracked.scene
+    (frame,) = tracked.frames
     if not polishing:
         # a method without a posterior reports one pose
         one_mode = frame if frame.posterior else with_one_mode(frame)
-        return scene, [one_mode]
+        return tracked._replace(frames=[one_mode])
     shown = next(iter(scene.observations))
     search = replace(task, start=method.start if task.yaw is None else None)
     frame = polished(search, frame, shown, polishing, method.audit.beta)
     if warning := beyond_prior(prior, task.body.skeleton, frame.pose):
         progress.warn(warning)
         scene = replace(scene, warnings=[*scene.warnings, warning])
-    return scene, [frame]
+    return tracked._replace(scene=scene, frames=[frame])
 
 
-def _smoothed(tracked: Smoothed, beta: float, progress: Progress) -> Smoothed:
+def _smoothed(
+    tracked: Smoothed, task: Task, beta: float, progress: Progress
+) -> Smoothed:
     """Return a smoothed track, with legs exchanged where smooth ones then fit better.
 
     Legs are only doubtful before one camera, and in footage long enough to judge them.
@@ -266,7 +273,9 @@ def _smoothed(tracked: Smoothed, beta: float, progress: Progress) -> Smoothed:
     usable = sum(observation.usable for observation in scene.observations)
     if len(scene.cameras) > 1 or scene.truth is not None or usable < SHORTEST:
         return smoothed
-    smoothed, exchanged = with_cheapest_legs(tracked.frames, smoothed, beta)
+    smoothed, exchanged = with_cheapest_legs(
+        tracked.frames, smoothed, beta, task.threads
+    )
     if exchanged.any():
         progress.log(
             f"legs exchanged in {exchanged.sum()} frames,"
@@ -405,6 +414,24 @@ def _cheapest_pass(
     return tracked, Smoothed(scene, frames, shape)
 
 
+class _Budget(NamedTuple):
+    """How a track's evaluations per frame are divided."""
+
+    passes: int  # how often the film is tracked
+    evaluations: int  # of a frame in each pass
+    polishing: int  # of a single picture after its search
+
+
+def _budget(
+    scene: Scene, method: Method, evaluations: int, options: TrackOptions
+) -> _Budget:
+    """Return the budget of a track with so many evaluations per frame."""
+    passes = _passes(scene, method, evaluations, bool(options.smooth))
+    in_pass = evaluations // passes
+    polishing = _polish_evaluations(scene, method, in_pass, options)
+    return _Budget(passes, in_pass - polishing, polishing)
+
+
 def _passes(scene: Scene, method: Method, evaluations: int, smoothed: bool) -> int:
     """Return how often a film is tracked.
 
@@ -440,11 +467,13 @@ def _pivot(scene: Scene, task: Task, method: Method) -> int:
     """
     if scene.truth is not None or not method.looks_ahead:
         return 0
-    first_yaw = next(
-        (observation.yaw for observation in scene.observations if observation.usable),
-        None,
-    )
-    return first_shown_whole(scene.observations) if task.yaw == first_yaw else 0
+    usable = (observation for observation in scene.observations if observation.usable)
+    first = next(usable, None)
+    masks_yaw = None if first is None else first.yaw
+    # any other yaw is of the very first frame: it was given, or restarts found it
+    if task.yaw != masks_yaw:
+        return 0
+    return first_shown_whole(scene.observations)
 
 
 def _tracked_back(

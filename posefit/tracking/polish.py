@@ -106,7 +106,7 @@ def polished(
     ]
     start = poses, places
     poses, places, used = contour_race(
-        task.body, views, start, precisions(TURN, SHIFT), cost
+        task.body, views, start, precisions(TURN, SHIFT), cost, task.threads
     )
     costs, areas = pose_costs(*scene, poses, places, beta)
     best = int(costs.argmin())

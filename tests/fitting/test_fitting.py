@@ -229,6 +229,21 @@ def test_aligning_near_a_camera_is_that_of_a_slow_twin(
         np.testing.assert_allclose(place, expected, atol=1e-5)
 
 
+def test_threads_align_the_same_bits() -> None:
+    camera = Camera.around(WALK.translations[0], 0.8, 3.5, (160, 120))
+    silhouette = Silhouette.of(
+        project(BODY, camera, WALK.poses[0], WALK.translations[0])
+    )
+    rng = np.random.default_rng(0)
+    poses = np.repeat(WALK.poses, 10, axis=0)
+    starts = WALK.translations[0] + rng.normal(0.0, 0.1, (len(poses), 3))
+    alone, shared = (
+        align(BODY, [camera], [silhouette], poses, starts, threads)
+        for threads in (1, 3)
+    )
+    np.testing.assert_array_equal(alone, shared)
+
+
 def test_mistakes_are_named(cost: SilhouetteCost) -> None:
     holed = np.zeros((1000, 9))
     holed[900, 3] = np.nan

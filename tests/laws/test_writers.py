@@ -602,6 +602,33 @@ def test_a_disk_without_room_for_the_poses_keeps_the_frames_and_resuming_writes_
     assert len(track) == 2
 
 
+@each(
+    ("error", "message"),
+    [
+        (OSError(errno.ENOSPC, "No space left"), "out: expected room on the disk"),
+        (OSError(errno.EIO, "Input/output error", "film.mp4"), "film.mp4"),
+    ],
+)
+def test_only_a_full_disk_is_called_one(
+    error: OSError, message: str, tmp_path: Path
+) -> None:
+    with (
+        pytest.raises((InputError, OSError), match=message),
+        OutputFolder(tmp_path / "out", False, False, {}, print),
+    ):
+        raise error
+
+
+def test_a_file_that_cannot_be_written_is_no_full_disk(tmp_path: Path) -> None:
+    with (
+        pytest.raises(
+            InputError, match="out: expected a place to write to, got Denied"
+        ),
+        OutputFolder(tmp_path / "out", False, False, {}, print) as output,
+    ):
+        raise PermissionError(errno.EACCES, "Denied", str(output.building / "a.npz"))
+
+
 def test_a_resumed_track_that_fails_before_its_first_frame_keeps_the_earlier_ones(
     tmp_path: Path,
 ) -> None:

@@ -196,3 +196,13 @@ def test_a_resampled_part_begins_at_the_same_second(fps: float, first: int) -> N
     part = clip(120).frames(100, 120).resampled(fps)
     assert (part.first, part.first / part.fps) == (first, pytest.approx(100 / 120.0))
     assert clip(120).frames(100, 101).resampled(fps).first == first
+
+
+def test_a_motion_twice_reversed_is_itself_until_it_is_changed() -> None:
+    motion = clip(4, 30.0)
+    backwards = motion.reversed()
+    np.testing.assert_array_equal(backwards.poses, motion.poses[::-1])
+    np.testing.assert_array_equal(backwards.translations, motion.translations[::-1])
+    assert backwards.reversed() is motion
+    part = backwards.frames(0, 2).reversed()
+    np.testing.assert_array_equal(part.poses, motion.poses[2:])

@@ -16,6 +16,7 @@ from unittest.mock import Mock
 import pytest
 
 from posefit.errors import InputError
+from posefit.silhouette.sharing import cores
 from posefit.suites.functions import SUITE
 from posefit.sweep.cell import SearchCell, TrackCell, run_cell
 from posefit.sweep.command import swept as sweep
@@ -23,7 +24,7 @@ from posefit.sweep.drive import Tally, drive
 from posefit.sweep.engine import Engine, Limits, Outcome
 from posefit.sweep.ledger import ATTEMPTS, FILE, Ledger, Writer
 from posefit.sweep.plan import Plan
-from posefit.sweep.pool import Pool, cores
+from posefit.sweep.pool import Pool
 from posefit.sweep.worker import _Process, become_worker
 from posefit.version import posefit_build
 from tests.cases import each

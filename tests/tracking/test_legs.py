@@ -51,9 +51,10 @@ def exchanged(scene: Scene, frames: list[Frame], which: range) -> list[Frame]:
     ]
 
 
-def found(scene: Scene, frames: list[Frame]) -> NDArray[np.bool_]:
+def found(scene: Scene, frames: list[Frame], threads: int = 2) -> NDArray[np.bool_]:
     """Return in which frames (T,) legs should be exchanged."""
-    return legs_exchanged(smooth(scene, frames, None, BETA), frames, ALL, BETA)
+    smoothed = smooth(scene, frames, None, BETA)
+    return legs_exchanged(smoothed, frames, ALL, BETA, threads)
 
 
 def changes(flags: NDArray[np.bool_]) -> list[int]:

@@ -19,6 +19,7 @@ from posefit.footage.source import scene_of
 from posefit.motion import built_in, recorded
 from posefit.progress import Progress
 from posefit.registry import Offer, Plugin, Registry, registry
+from posefit.silhouette import sharing
 from posefit.testing.toy import Toy, sphere
 from posefit.tracking import defaults, method
 from posefit.tracking.defaults import completed
@@ -254,6 +255,19 @@ def test_the_method_and_the_training_motions_depend_on_the_source() -> None:
         assert (options.method, options.train) == (expected, train), (source, given)
         again = completed(TrackOptions(**{**given, "method": options.method}), motion)
         assert (again.method, again.train) == (expected, train), (source, given)
+
+
+def test_a_track_uses_the_cores_of_the_processor_but_at_most_four(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    for cores, threads in ((1, 1), (3, 3), (64, 4)):
+        monkeypatch.setattr(sharing, "cores", lambda cores=cores: cores)
+        assert completed(TrackOptions(), None).threads == threads
+        assert completed(TrackOptions(threads=6), None).threads == 6
+    # as in a worker of a sweep
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    assert completed(TrackOptions(), None).threads == 1
 
 
 @each(

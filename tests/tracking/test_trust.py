@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
+from posefit import load_motion
 from posefit.evaluation.trust import (
     ONE_CAMERA,
     SIGNS,
@@ -22,15 +23,18 @@ from posefit.evaluation.trust import (
     sentence,
     signs_against,
     stance_spread,
+    training_distances,
     trust_line,
     trust_of,
 )
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import JOINTS
+from posefit.geometry.symmetry import mirrored_poses
 from posefit.motion.motion import Motion
 from posefit.motion.steadiness import BALLS
 from posefit.silhouette.mask import Silhouette
+from posefit.uncertainty.modes import poses_apart
 from tests.cases import each
 from tests.tracking.scenes import exact_frames, tracked, viewed, walk
 
@@ -48,6 +52,22 @@ def test_the_longer_side_of_a_mask_is_that_of_its_bounding_box() -> None:
     assert longer_side(mask) == 10
     mask[15:, 4:8] = True  # cut by the edge
     assert longer_side(mask) == 0
+
+
+def test_the_nearest_training_pose_is_that_of_comparing_all() -> None:
+    motions = [load_motion("walk"), load_motion("run-a")]
+    skeleton = motions[0].skeleton
+    poses = motions[1].poses[::7] + 0.1
+    facing = [np.concatenate([poses, mirrored_poses(skeleton, poses)])]
+    facing += [motion.poses[::2].copy() for motion in motions]  # 15 a second
+    for each_poses in facing:
+        each_poses[:, 0] = 0.0
+    expected = poses_apart(skeleton, facing[0], np.concatenate(facing[1:])).min(axis=1)
+    np.testing.assert_allclose(
+        training_distances(skeleton, poses, motions),
+        expected.reshape(2, -1).min(axis=0),
+        rtol=1e-12,
+    )
 
 
 def test_depth_scatter_is_the_deviation_from_a_smooth_path() -> None:

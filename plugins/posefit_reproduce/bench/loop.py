@@ -18,7 +18,7 @@ from posefit.fitting.problem import Problem, minimise
 from posefit.fitting.space import SearchSpace
 from posefit.registry import Offer, registry
 from posefit.settings import planned
-from posefit.sweep.pool import cores
+from posefit.silhouette.sharing import cores
 from posefit_reproduce.bench.kernel import (
     SIZE,
     bench_cost,

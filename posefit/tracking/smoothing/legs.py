@@ -23,6 +23,7 @@ from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import JOINTS, LIMBS, root_centred
 from posefit.geometry.symmetry import exchanged_limbs, mirrored_poses
 from posefit.motion.motion import Motion
+from posefit.silhouette.sharing import shares_of, work_through
 from posefit.tracking.smoothing.smooth import Smoothed, drawn, smooth, smoothed_motion
 from posefit.tracking.trajectory import cheapest_sequence, mean_cost
 from posefit.uncertainty.calibration import SECOND_SIDE
@@ -50,7 +51,7 @@ LEG_JOINTS = [
 
 
 def with_cheapest_legs(
-    tracked: Sequence[Frame], smoothed: Smoothed, beta: float
+    tracked: Sequence[Frame], smoothed: Smoothed, beta: float, threads: int = 1
 ) -> tuple[Smoothed, NDArray[np.bool_]]:
     """Return smoothed frames with legs exchanged wherever that is cheaper.
 
@@ -61,6 +62,7 @@ def with_cheapest_legs(
         tracked: The tracked frames.
         smoothed: The same, smoothed.
         beta: The weight in the cost, see `posefit.silhouette.cost`.
+        threads: Number of threads. Does not change the result.
 
     Returns:
         The smoothed frames, and whether legs are exchanged in each of them (T,).
@@ -71,7 +73,7 @@ def with_cheapest_legs(
     usable = np.array([observation.usable for observation in scene.observations])
     changed = np.zeros(len(tracked), dtype=bool)
     for _ in range(ROUNDS):
-        exchanged = legs_exchanged(smoothed, tracked, usable, beta)
+        exchanged = legs_exchanged(smoothed, tracked, usable, beta, threads)
         pairs = zip(tracked, exchanged, strict=True)
         frames = [
             _exchanged(smoothed.scene, frame) if other else frame
@@ -91,7 +93,11 @@ def with_cheapest_legs(
 
 
 def legs_exchanged(
-    smoothed: Smoothed, frames: Sequence[Frame], usable: NDArray[np.bool_], beta: float
+    smoothed: Smoothed,
+    frames: Sequence[Frame],
+    usable: NDArray[np.bool_],
+    beta: float,
+    threads: int = 1,
 ) -> NDArray[np.bool_]:
     """Return in which frames (T,) exchanged legs are cheaper.
 
@@ -100,6 +106,7 @@ def legs_exchanged(
         frames: The tracked frames.
         usable: (T,) whether a frame shows enough of the person.
         beta: The weight in the cost, see `posefit.silhouette.cost`.
+        threads: Number of threads. Does not change the result.
 
     """
     scene = smoothed.scene
@@ -110,12 +117,15 @@ def legs_exchanged(
     odds = _odds(scene, here)
     reach = max(round(TRIAL_SECONDS * scene.fps), 2)
     # a few steps are enough to see which stretches are beyond doubt
-    quick = _smoothed_costs(scene, there, beta, QUICK_SCALES)
+    (quick,) = _smoothed_costs(scene, [there], beta, QUICK_SCALES)
     near = max(round(DOUBT_SECONDS * scene.fps), 1)
     edges, anything = in_doubt(edges, near, costs, quick - costs + odds, usable)
     if not anything:
         return np.zeros(len(frames), dtype=bool)
-    added = _smoothed_costs(scene, there, beta) - _smoothed_costs(scene, here, beta)
+    costs_there, costs_here = _smoothed_costs(
+        scene, [there, here], beta, threads=threads
+    )
+    added = costs_there - costs_here
     exchanged = np.zeros(len(frames), dtype=np.int64)
     switches = []
     side = 0  # whether legs are exchanged from the latest edge on
@@ -125,18 +135,17 @@ def legs_exchanged(
         exchanged[before:edge] = side
         before = edge
         rows = range(max(edge - reach, 0), min(edge + reach, len(frames)))
-        window = replace(scene, observations=[scene.observations[k] for k in rows])
+        shown = [scene.observations[k] for k in rows]
+        window = replace(scene, observations=shown, count=len(shown))
         earlier = exchanged[rows.start : edge].tolist()
         trials = []
         for later in (side, 1 - side):
             which = [*earlier, *[later] * (rows.stop - edge)]
-            trials.append([pairs[w][k] for w, k in zip(which, rows, strict=True)])
-        same, other = (
-            _smoothed_costs(window, window.motion(trial), beta).sum()
-            for trial in trials
-        )
+            trial = [pairs[w][k] for w, k in zip(which, rows, strict=True)]
+            trials.append(window.motion(trial))
+        same, other = _smoothed_costs(window, trials, beta, threads=threads)
         later_cost = added[edge : rows.stop].sum()
-        switch = other - same - (-later_cost if side else later_cost)
+        switch = other.sum() - same.sum() - (-later_cost if side else later_cost)
         switches.append(abs(switch))
         if switch < 0.0:
             side = 1 - side
@@ -286,14 +295,29 @@ def _with_both(scene: Scene, frame: Frame, share: float) -> Frame:
 
 
 def _smoothed_costs(
-    scene: Scene, motion: Motion, beta: float, scales: Sequence[float] = ROBUST_SCALES
+    scene: Scene,
+    motions: Sequence[Motion],
+    beta: float,
+    scales: Sequence[float] = ROBUST_SCALES,
+    threads: int = 1,
 ) -> Array:
-    """Return the costs (T,) of a motion once smoothed, 0 for unusable frames."""
-    scene, motion, _ = smoothed_motion(scene, motion, None, beta, scales)
+    """Return the costs (n, T) of motions once smoothed, 0 for unusable frames.
+
+    Several threads smooth several motions side by side.
+    """
     usable = np.array([observation.usable for observation in scene.observations])
-    costs = np.zeros(len(motion))
-    if usable.any():
-        _, costs[usable] = drawn(scene, motion, np.flatnonzero(usable), beta)
+    rows = np.flatnonzero(usable)
+    costs = np.zeros((len(motions), len(usable)))
+
+    def smooth_part(part: slice) -> None:
+        for number in range(part.start, part.stop):
+            fitted, motion, _ = smoothed_motion(
+                scene, motions[number], None, beta, scales
+            )
+            if len(rows):
+                _, costs[number, rows] = drawn(fitted, motion, rows, beta)
+
+    work_through(shares_of(len(motions), threads), threads, lambda _: (), smooth_part)
     return costs
 
 

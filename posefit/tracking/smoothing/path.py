@@ -101,8 +101,10 @@ class Squares:
 
         _, count, numbers, _ = self.hessians.shape
         band = (BAND_REACH + 1) * numbers
-        # scipy's upper form: lines[band - 1 + row - column, column]
-        lines = np.zeros((band, count, numbers))
+        # SciPy's upper form: lines[band - 1 + row - column, column]. It is laid out by
+        # columns, as LAPACK takes it: another layout would be copied twice.
+        columns_first = np.zeros((count, numbers, band))
+        lines = columns_first.transpose(2, 0, 1)
         rows, columns = np.indices((numbers, numbers)).reshape(2, -1)
         for apart in range(BAND_REACH + 1):
             off = apart * numbers + columns - rows
@@ -112,8 +114,9 @@ class Squares:
             values = self.hessians[apart, : count - apart, row, column]
             lines[band - 1 - off[upper], apart:, column] = values
         steps = solveh_banded(
-            lines.reshape(band, -1),
+            columns_first.reshape(-1, band).T,
             gradients.reshape(count * numbers, -1),
+            overwrite_ab=True,
             check_finite=False,
         )
         return np.asarray(steps).reshape(gradients.shape)
