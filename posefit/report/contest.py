@@ -1,178 +1,17 @@
-"""The table of a report's runs, the protocol of their kind, and their contest."""
+"""The methods of a sweep on the runs that they share."""
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.errors import printable
-from posefit.report.columns import Column, Score
-from posefit.settings import settings_text
+from posefit.report.runs import Runs
 from posefit.statistics.paired import PairedTest, paired_tests
-from posefit.statistics.pairing import Shared
-
-Place = Mapping[str, Any]  # the fields of a plan that define an instance
-Row = Mapping[str, Any]
-
-
-class Kind(Protocol):
-    """A kind of runs, tracks or single searches: its figures, names and texts.
-
-    Attributes:
-        name: The kind's name, in the singular.
-        noun: Its runs, in the plural.
-        title: The title of the page.
-        columns: Its figures by name.
-        score: The figure that orders the methods.
-        named: The fields that an instance's name contains.
-        data: The names of a row's other data.
-        baselines: The label of each baseline by name.
-    """
-
-    name: str
-    noun: str
-    title: str
-    columns: Mapping[str, Column]
-    score: Score
-    named: tuple[str, ...]
-    data: tuple[str, ...]
-    baselines: Mapping[str, str]
-
-    def computed(self, row: Row, /) -> dict[str, float]:
-        """Return the figures that a row of a ledger does not have itself."""
-        ...
-
-    def read(
-        self, row: Row, shared: dict[bytes, Any], /
-    ) -> tuple[Array, tuple[Any, ...]]:
-        """Return the figures of a row and its other data.
-
-        `shared` holds arrays that many rows have in common, to save memory.
-        """
-        ...
-
-    def rank(self, place: Place) -> tuple[Any, ...]:
-        """Return the key by which instances are sorted."""
-        ...
-
-    def place_name(self, place: Place) -> str:
-        """Return an instance's name."""
-        ...
-
-    def facts(self, runs: "Runs") -> dict[str, Any]:
-        """Return the facts about the runs by their titles."""
-        ...
-
-    def tested_errors(self, contest: "Contest") -> Array:
-        """Return the errors (methods, blocks, 1) for tests. Lower is better."""
-        ...
-
-    def board(self, contest: "Contest") -> dict[int, dict[str, Any]]:
-        """Return the entries of each method's leaderboard row besides averages."""
-        ...
-
-    def baseline_rows(self, contest: "Contest") -> list[dict[str, Any]]:
-        """Return the baselines' rows, on the same runs as the methods."""
-        ...
-
-    def place_words(self, contest: "Contest") -> str:
-        """Return the instances of a contest in words."""
-        ...
-
-    def baseline_sentences(self, first: Row, baselines: Sequence[Row]) -> list[str]:
-        """Return sentences that compare the best baseline with the first method.
-
-        The rows of both are given.
-        """
-        ...
-
-    def page(self, runs: "Runs", contest: "Contest | None", /) -> dict[str, Any]:
-        """Return the data that only pages of this kind have, with their `sections`."""
-        ...
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Runs:
-    """All n finished rows of a ledger, sorted by instance, method and seed.
-
-    Names are distinct, and printable on one line. The name, settings, budget, version
-    and other choices of a method distinguish methods. All other fields except the seed
-    distinguish instances.
-
-    Attributes:
-        kind: The kind of the runs.
-        version: The versions of posefit that ran them.
-        methods: The names of methods, the best mean score first.
-        variants: The fields that define each method.
-        instances: The names of instances.
-        places: The fields that define each instance.
-        method: The index (n,) of each row's method.
-        instance: The index (n,) of each row's instance.
-        seed: The index (n,) of each row's seed.
-        seeds: The seeds, rising.
-        keys: The key of each row.
-        figures: Each figure (n,) by name, nan if a row does not have it.
-        data: The other data of each row, by the names of `Kind.data`.
-        warnings: The warnings of each row that has some, by its index.
-        failures: The name, method, key, reasons and command of each quarantined cell.
-    """
-
-    kind: Kind
-    version: str
-    methods: tuple[str, ...]
-    variants: tuple[dict[str, Any], ...]
-    instances: tuple[str, ...]
-    places: tuple[dict[str, Any], ...]
-    method: Array
-    instance: Array
-    seed: Array
-    seeds: tuple[int, ...]
-    keys: tuple[str, ...]
-    figures: dict[str, Array]
-    data: dict[str, Sequence[Any]]
-    warnings: Mapping[int, tuple[str, ...]]
-    failures: tuple[dict[str, Any], ...]
-
-    def __len__(self) -> int:
-        return len(self.keys)
-
-    @property
-    def settings(self) -> list[str]:
-        """The settings of each method, as a text."""
-        return [
-            printable(", ".join(settings_text(variant["settings"])))
-            for variant in self.variants
-        ]
-
-    @cached_property
-    def failed(self) -> Counter[str]:
-        """The number of quarantined cells by the name of their method."""
-        return Counter(failure["method"] for failure in self.failures)
-
-    @property
-    def table_figures(self) -> list[str]:
-        """The figures in tables. Optional ones are there only if a row has them."""
-        names = []
-        for name, column in self.kind.columns.items():
-            is_missing = column.optional and np.isnan(self.figures[name]).all()
-            if column.in_tables and not is_missing:
-                names.append(name)
-        return names
-
-    @property
-    def scores(self) -> Array:
-        """The figure (n,) that orders the methods."""
-        return self.figures[self.kind.score.name]
-
-    def values(self, field: str) -> list[Any]:
-        """Return the distinct values of a field of methods or instances, rising."""
-        definitions = (*self.variants, *self.places)
-        return sorted({fields[field] for fields in definitions if field in fields})
+from posefit.statistics.pairing import Shared, most_shared
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -238,3 +77,31 @@ class Contest(Shared):
         if min(self.tested_errors.shape[:2]) < 2:
             return []
         return paired_tests(self.tested_errors)
+
+    def tests_against(self, method: int) -> Iterator[tuple[int, PairedTest]]:
+        """Yield each other method that takes part, and its test against one method.
+
+        A difference above 0 means that the other method is worse.
+        """
+        place = self.methods.index(method)
+        for test in self.comparisons:
+            if test.second == place:
+                yield self.methods[test.first], test
+            elif test.first == place:
+                yield self.methods[test.second], test.turned
+
+
+def contest_of(runs: Runs) -> Contest | None:
+    """Return the contest of the methods that share enough runs.
+
+    A method does not take part if it would leave less than half of the runs that the
+    others share.
+
+    Args:
+        runs: All runs of a ledger.
+
+    Returns:
+        The contest, or None if no run has an error.
+    """
+    shared = most_shared(runs.method, runs.instance, runs.seed, runs.scores)
+    return None if shared is None else Contest(**vars(shared), runs=runs)

@@ -1,366 +1,125 @@
-"""Reads the finished rows of a ledger into a table, which holds a hundred thousand."""
+"""The finished runs of a ledger as arrays."""
 
-import json
-from array import array
-from collections.abc import Iterable, Mapping, Sequence
-from itertools import chain
-from typing import TYPE_CHECKING, Any
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from posefit.errors import InputError, printable
-from posefit.reading import quoted, suggestion
-from posefit.report.columns import listed
-from posefit.report.contest import Kind, Runs
-from posefit.report.repeat import repeat_command
-from posefit.report.searches import SEARCHES
-from posefit.report.tracks import TRACKS
-from posefit.settings import setting_text
-from posefit.sweep.cell import cell_from, other_version
-
-if TYPE_CHECKING:
-    from posefit.arrays import Array
-    from posefit.sweep.ledger import Ledger
-
-KINDS: dict[str, Kind] = {kind.name: kind for kind in (TRACKS, SEARCHES)}
-# the fields that define a method; all others except the seed define an instance
-_METHOD_FIELDS = (
-    "method",
-    "name",
-    "settings",
-    "evaluations",
-    "hypotheses",
-    "infeasible",
-    "version",
-)
+from posefit.arrays import Array
+from posefit.errors import printable
+from posefit.report.kind import Indices, Kind
+from posefit.settings import settings_text
 
 
-class _Distinct:
-    """Distinct values, numbered in the order in which they are added."""
+@dataclass(frozen=True)
+class Failure:
+    """A quarantined cell.
 
-    def __init__(self) -> None:
-        self.values: list[dict[str, Any]] = []
-        self._numbers: dict[str, int] = {}
-
-    def number(self, value: dict[str, Any]) -> int:
-        """Return the number of a value, and add it if it is new."""
-        key = _text(value)
-        if key not in self._numbers:
-            self._numbers[key] = len(self.values)
-            self.values.append(value)
-        return self._numbers[key]
-
-
-class _Rows:
-    """The rows of a ledger in its order, with numbered methods and instances.
-
-    Raises InputError if the ledger has no row, finished or quarantined, or has both
-    tracks and searches.
+    Attributes:
+        name: Its method, instance and seed.
+        method: The name of its method.
+        key: The first digits of its key.
+        reasons: Why its attempts failed.
+        command: A command that runs it again.
     """
 
-    def __init__(self, ledger: "Ledger") -> None:
-        self.methods = _Distinct()
-        self.places = _Distinct()
-        # of each finished row
-        self.method: list[int] = []
-        self.place: list[int] = []
-        self.seeds: list[int] = []  # of any size, so not an array
-        self.keys: list[str] = []
-        self.warnings: list[tuple[str, ...]] = []
-        # one after the other: an array for each of a million rows takes twice as much
-        self.figures = array("d")
-        self.data: list[tuple[Any, ...]] = []
-        self.quarantined = ledger.quarantined()
-        shared: dict[bytes, Any] = {}  # arrays that many rows have in common
-        kinds = set[str]()
-        for row in chain(ledger.rows(), self.quarantined):
-            kinds.add(row["spec"]["kind"])
-            if len(kinds) > 1:
-                raise InputError(
-                    f"{ledger.path}: expected a ledger of either tracks or single "
-                    "searches, got both"
-                )
-            if row["status"] == "done":
-                try:
-                    self._add(row, shared)
-                # raised if a figure is missing or has another type
-                except (ValueError, TypeError, LookupError, AttributeError) as error:
-                    raise ledger.damaged_row(row["key"], error) from None
-        if not kinds:
-            raise InputError(
-                f"{ledger.path}: expected a ledger with finished rows, got none"
-            )
-        self.kind = KINDS[kinds.pop()]
-        # methods that only failed have the numbers from here on
-        self.finished_methods = len(self.methods.values)
-        self.failed_method = [
-            self.methods.number(_variant(cell["spec"])) for cell in self.quarantined
+    name: str
+    method: str
+    key: str
+    reasons: tuple[str, ...]
+    command: str
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Runs:
+    """All n finished rows of a ledger, sorted by instance, method and seed.
+
+    Names are distinct, and printable on one line. The name, settings, budget, version
+    and other choices of a method distinguish methods. All other fields except the seed
+    distinguish instances.
+
+    Attributes:
+        kind: The kind of the runs.
+        version: The versions of posefit that ran them.
+        methods: The names of methods, the best mean score first.
+        variants: The fields that define each method.
+        instances: The names of instances.
+        places: The fields that define each instance.
+        method: The index (n,) of each row's method.
+        instance: The index (n,) of each row's instance.
+        seed: The index (n,) of each row's seed.
+        seeds: The seeds, rising.
+        keys: The key of each row.
+        figures: Each figure (n,) by name, nan if a row does not have it.
+        data: The other data of each row by name, see `Kind.read`.
+        warnings: The warnings of each row that has some, by its index.
+        failures: The quarantined cells.
+    """
+
+    kind: Kind
+    version: str
+    methods: tuple[str, ...]
+    variants: tuple[dict[str, Any], ...]
+    instances: tuple[str, ...]
+    places: tuple[dict[str, Any], ...]
+    method: Array
+    instance: Array
+    seed: Array
+    seeds: tuple[int, ...]
+    keys: tuple[str, ...]
+    figures: dict[str, Array]
+    data: Mapping[str, Sequence[Any]]
+    warnings: Mapping[int, tuple[str, ...]]
+    failures: tuple[Failure, ...]
+
+    def __len__(self) -> int:
+        return len(self.keys)
+
+    @property
+    def settings(self) -> list[str]:
+        """The settings of each method, as a text."""
+        return [
+            printable(", ".join(settings_text(variant["settings"])))
+            for variant in self.variants
         ]
 
-    def _add(self, row: Mapping[str, Any], shared: dict[bytes, Any]) -> None:
-        spec = row["spec"]
-        figures, data = KINDS[spec["kind"]].read(row, shared)
-        self.figures.extend(figures.tolist())
-        self.data.append(data)
-        self.method.append(self.methods.number(_variant(spec)))
-        self.place.append(self.places.number(_place(spec)))
-        self.seeds.append(int(spec["seed"]))
-        self.keys.append(row["key"])
-        self.warnings.append(tuple(map(printable, row["warnings"])))
+    @cached_property
+    def failed(self) -> Counter[str]:
+        """The number of quarantined cells by the name of their method."""
+        return Counter(failure.method for failure in self.failures)
 
+    @property
+    def table_figures(self) -> list[str]:
+        """The figures in tables. Optional ones are there only if a row has them."""
+        names = []
+        for name, column in self.kind.columns.items():
+            is_missing = column.optional and np.isnan(self.figures[name]).all()
+            if column.in_tables and not is_missing:
+                names.append(name)
+        return names
 
-def runs_of(
-    ledger: "Ledger", methods: Sequence[str] = (), *, latest: bool = False
-) -> Runs:
-    """Return the finished rows of a ledger.
+    @property
+    def scores(self) -> Array:
+        """The figure (n,) that orders the methods."""
+        return self.figures[self.kind.score.name]
 
-    Their order does not depend on which of them finished first.
+    def averages(self, rows: Indices) -> dict[str, float | None]:
+        """Return the average of each figure over some rows, given by their indices."""
+        averages = {}
+        for name, column in self.kind.columns.items():
+            averages[name] = column.average(self.figures[name][rows])
+        return averages
 
-    Args:
-        ledger: An open ledger, of tracks or of single searches.
-        methods: The methods whose runs are returned, by their names in the report or in
-            the plan. All if empty.
-        latest: Whether to return only one version of each method: the installed
-            version, or else the one planned last.
+    def lost_tracks(self, rows: Indices) -> int | None:
+        """Return how many of some rows lost frames; None if nothing can be lost."""
+        if "lost_rate" not in self.figures:
+            return None
+        return int((self.figures["lost_rate"][rows] > 0.0).sum())
 
-    Returns:
-        The runs, and the failures. If every cell failed, there are no runs.
-
-    Raises:
-        ValueError: The ledger has neither a row nor a failure, or both tracks and
-            single searches, or no method has one of the names.
-    """
-    rows = _Rows(ledger)
-    kind = rows.kind
-    figures = np.asarray(rows.figures).reshape(-1, len(kind.columns))
-    score = figures[:, list(kind.columns).index(kind.score.name)]
-    label_of = _labels(rows, score, latest)
-    chosen = _named(methods, label_of, rows) if methods else list(label_of)
-    finished = [m for m in chosen if m < rows.finished_methods]
-
-    # the rows of these methods, sorted by instance, method and seed
-    retained = set(finished)
-    numbers = [k for k, m in enumerate(rows.method) if m in retained]
-    places = rows.places.values
-    place_order = sorted(
-        {rows.place[k] for k in numbers},
-        key=lambda i: (kind.rank(places[i]), _text(places[i])),
-    )
-    seeds = sorted({rows.seeds[k] for k in numbers})
-
-    def ranks(values: Sequence[int], order: Sequence[int]) -> "Array":
-        """Return the places of these rows' values in an order."""
-        rank = {value: place for place, value in enumerate(order)}
-        return np.array([rank[values[k]] for k in numbers], dtype=int)
-
-    instance = ranks(rows.place, place_order)
-    method = ranks(rows.method, finished)
-    seed = ranks(rows.seeds, seeds)
-    order = np.lexsort((seed, method, instance))
-    numbers = [numbers[k] for k in order.tolist()]
-
-    columns = zip(*(rows.data[k] for k in numbers), strict=True)
-    warnings = {}
-    for place, k in enumerate(numbers):
-        if rows.warnings[k]:
-            warnings[place] = rows.warnings[k]
-    failures = []
-    for cell, m in zip(rows.quarantined, rows.failed_method, strict=True):
-        if m in chosen:
-            failures.append(_failure(cell, label_of[m]))
-    return Runs(
-        kind=kind,
-        version=ledger.version,
-        methods=tuple(label_of[m] for m in finished),
-        variants=tuple(rows.methods.values[m] for m in finished),
-        instances=_instance_names(kind, [places[i] for i in place_order]),
-        places=tuple(places[i] for i in place_order),
-        method=method[order],
-        instance=instance[order],
-        seed=seed[order],
-        seeds=tuple(seeds),
-        keys=tuple(rows.keys[k] for k in numbers),
-        figures=dict(zip(kind.columns, figures[numbers].T, strict=True)),
-        # without rows there are no columns
-        data=dict(zip(kind.data, columns, strict=False)),
-        warnings=warnings,
-        failures=tuple(failures),
-    )
-
-
-def _labels(rows: _Rows, score: "Array", latest: bool) -> dict[int, str]:
-    """Return the distinct names of methods by their numbers, the best first.
-
-    Methods that only failed are last.
-    """
-    variants = rows.methods.values
-    method = np.array(rows.method)
-    badness = np.nan_to_num(-score if rows.kind.score.down else score, nan=np.inf)
-    means = [badness[method == m].mean() for m in range(rows.finished_methods)]
-    means += [np.inf] * (len(variants) - len(means))
-    best_first = sorted(
-        _latest(variants) if latest else range(len(variants)),
-        key=lambda m: (m >= rows.finished_methods, means[m], _text(variants[m])),
-    )
-    names = distinct(
-        [_planned_name(variants[m]) for m in best_first],
-        [_variation(variants[m]) for m in best_first],
-    )
-    return dict(zip(best_first, names, strict=True))
-
-
-def _instance_names(kind: Kind, places: Sequence[dict[str, Any]]) -> tuple[str, ...]:
-    """Return the distinct names of instances."""
-    details = []
-    for place in places:
-        unnamed = {}
-        for name, value in place.items():
-            if name not in kind.named:
-                unnamed[name] = _text(value).strip('"')
-        details.append(unnamed)
-    return distinct([kind.place_name(place) for place in places], details)
-
-
-def _latest(variants: Sequence[Mapping[str, Any]]) -> list[int]:
-    """Return one version of each method, by their indices.
-
-    It is the installed version, or else the one planned last.
-    """
-    best: dict[str, tuple[bool, int]] = {}
-    for m, variant in enumerate(variants):
-        versions = variant["version"].split(", ")
-        installed = not any(map(other_version, versions))
-        other_fields = {**variant, "version": ""}
-        key = _text(other_fields)
-        best[key] = max(best.get(key, (False, -1)), (installed, m))
-    return sorted(m for _, m in best.values())
-
-
-def _named(names: Sequence[str], label_of: Mapping[int, str], rows: _Rows) -> list[int]:
-    """Return the methods with the given names, in the order of their labels.
-
-    Raises InputError if no method has one of the names.
-    """
-    variants = rows.methods.values
-    names_of = {m: {label, _planned_name(variants[m])} for m, label in label_of.items()}
-    known = set().union(*names_of.values())
-    for name in names:
-        if name not in known:
-            raise InputError(
-                f"--methods must be of {listed(sorted(label_of.values()), 12)}, "
-                f"got {quoted(name)}{suggestion(name, known)}"
-            )
-    return [m for m in label_of if names_of[m] & set(names)]
-
-
-def _planned_name(variant: Mapping[str, Any]) -> str:
-    """Return a method's name in the plan."""
-    return str(variant["name"] or variant["method"])
-
-
-def _failure(cell: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """Return the page's data of a quarantined cell of a method with this name."""
-    return {
-        "name": printable(str(cell_from({**cell["spec"], "name": name}))),
-        "method": name,
-        "key": cell["key"][:8],
-        "reasons": [*map(printable, dict.fromkeys(cell["reasons"]))],
-        "command": repeat_command(cell["spec"]),
-    }
-
-
-def _variant(spec: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields that define a method.
-
-    Searches have a budget per dimension instead of their evaluations.
-    """
-    fields = {name: spec[name] for name in _METHOD_FIELDS if name in spec}
-    fields["settings"] = dict(sorted(spec["settings"].items()))
-    if "dimension" in spec:
-        fields["budget"] = fields.pop("evaluations") / spec["dimension"]
-    return fields
-
-
-def _variation(variant: Mapping[str, Any]) -> dict[str, str]:
-    """Return the texts that may distinguish a method from others of the same name."""
-    texts = {name: setting_text(value) for name, value in variant["settings"].items()}
-    for name in ("method", "evaluations", "budget", "hypotheses", "infeasible"):
-        if name in variant:
-            value = variant[name]
-            texts[name] = value if isinstance(value, str) else f"{value:.12g}"
-    for part in variant["version"].split(", "):
-        name, _, version = part.partition(" ")
-        texts[name] = version
-    return texts
-
-
-def _place(spec: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields that define an instance."""
-    fields = {}
-    for name, value in spec.items():
-        if name not in (*_METHOD_FIELDS, "kind", "seed"):
-            fields[name] = value
-    return fields
-
-
-def distinct(
-    names: Sequence[str], details: Iterable[Mapping[str, str]]
-) -> tuple[str, ...]:
-    """Return distinct names.
-
-    If a name occurs several times, the details that differ follow in brackets:
-    `sapso@pca (cooling 0.9)`. The setting `sapso.cooling` is shortened to `cooling` if
-    no other differing setting has that name. If no detail differs, a number is added.
-
-    Args:
-        names: The names.
-        details: The details of each by their names.
-
-    Returns:
-        The distinct names in the same order.
-    """
-    details = list(details)
-    by_name: dict[str, list[Mapping[str, str]]] = {}
-    for name, values in zip(names, details, strict=True):
-        by_name.setdefault(name, []).append(values)
-    differing = {name: _differing(several) for name, several in by_name.items()}
-    longer: dict[str, None] = {}  # an ordered set
-    for name, values in zip(names, details, strict=True):
-        words = []
-        for field, short in differing[name].items():
-            if field in values:
-                words.append(f"{short} {values[field]}")
-        text = name
-        if words:
-            text = f"{name} ({', '.join(words)})"
-        plain = printable(text)
-        unique = plain
-        number = 1
-        while unique in longer:
-            number += 1
-            unique = f"{plain} ({number})"
-        longer[unique] = None
-    return tuple(longer)
-
-
-def _differing(several: Sequence[Mapping[str, str]]) -> dict[str, str]:
-    """Return the fields whose values differ between the mappings, with short names."""
-    fields: dict[str, None] = {}  # an ordered set
-    # the mapping with the most fields decides their order
-    for values in sorted(several, key=len, reverse=True):
-        fields |= dict.fromkeys(values)
-    differing = []
-    for field in fields:
-        if len({values.get(field) for values in several}) > 1:
-            differing.append(field)
-    short_names = [field.rpartition(".")[2] for field in differing]
-    names = {}
-    for field, short in zip(differing, short_names, strict=True):
-        is_unique = short_names.count(short) == 1
-        names[field] = short if is_unique else field
-    return names
-
-
-def _text(value: Any) -> str:
-    """Return the JSON text of a value. Those of 1, 1.0 and true differ."""
-    return json.dumps(value, sort_keys=True)
+    def values(self, field: str) -> list[Any]:
+        """Return the distinct values of a field of methods or instances, rising."""
+        definitions = (*self.variants, *self.places)
+        return sorted({fields[field] for fields in definitions if field in fields})

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from posefit.errors import printable
-from posefit.report.repeat import repeat_command
+from posefit.sweep.repeat import repeat_command
 from tests.report.browser import EVIL, ledger, opened, result, sure, written
 from tests.report.searched import cell, problems, search_result, searched
 from tests.sweep.fake import cells, rows_in

@@ -21,15 +21,9 @@ from posefit.errors import InputError
 from posefit.registry import registry
 from posefit.sweep.cell import other_version
 from posefit.sweep.command import cells_of, swept
-from posefit.sweep.ledger import (
-    ATTEMPTS,
-    FILE,
-    FORMAT,
-    LOSSES,
-    MIGRATIONS,
-    Ledger,
-    Writer,
-)
+from posefit.sweep.ledger import Ledger
+from posefit.sweep.schema import FILE, FORMAT, MIGRATIONS
+from posefit.sweep.writer import ATTEMPTS, LOSSES, Writer
 from posefit.version import posefit_build
 from tests.cases import each
 from tests.report import browser
@@ -355,7 +349,7 @@ def test_a_file_that_is_not_a_ledger_is_named(tmp_path: Path) -> None:
 
 HOLD = """
 import sys, time
-from posefit.sweep.ledger import Writer
+from posefit.sweep.writer import Writer
 with Writer(sys.argv[1]):
     print("open", flush=True)
     time.sleep(600)

@@ -12,10 +12,10 @@ from typing import Any
 
 import pytest
 
-from posefit.report.repeat import repeat_command
 from posefit.sweep.cell import run_cell
 from posefit.sweep.check import cell_of, search_of
 from posefit.sweep.plan import Plan
+from posefit.sweep.repeat import repeat_command
 from tests.commands import error_of, run
 from tests.report.browser import ledger
 from tests.sweep.fake import cells, rows_in
