@@ -8,6 +8,7 @@ import pytest
 from posefit.report import figures
 from posefit.report.charts import Chart, Line
 from posefit.report.page import LIGHT
+from tests.report.contests import contest_of_errors, full, standings
 
 pytest.importorskip("matplotlib")
 
@@ -65,4 +66,4 @@ def test_the_leaderboard_is_a_picture_with_its_rows_from_top_to_bottom(tmp_path)
     # errors are 0.1 higher on each instance, and 0.01 higher with the second seed
     values = [float(one.get_xdata()[0]) for one in (first, second, baseline)]
     assert values == pytest.approx([1.155, 2.155, 4.0])
-    assert first.get_color() == [*LIGHT.values()][0]
+    assert first.get_color() == figures.COLOURS[0]
