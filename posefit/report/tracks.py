@@ -6,6 +6,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, replace
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -285,7 +286,7 @@ class Tracks:
         first = standings.board[0].figures[LOSS]
         if not known or first is None:
             return []
-        error, title = min(known)
+        error, title = min(known, key=itemgetter(0))
         if error > first:
             return [f"The best baseline, the {title}, has {SCORE.text(error)}."]
         return [f"It does not beat the baselines: the {title} has {SCORE.text(error)}."]

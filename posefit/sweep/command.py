@@ -16,13 +16,9 @@ from posefit.sweep.drive import Tally, drive
 from posefit.sweep.engine import Engine, Limits
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import MAX_CELLS
-<<<<<<< HEAD
 from posefit.sweep.pool import Pool
-=======
-from posefit.sweep.pool import Pool, cores
 from posefit.sweep.schema import FILE
 from posefit.sweep.writer import Writer
->>>>>>> 682e28b6 (The ledger is split by subject; rows of the leaderboard are typed; constants of the page have one definition)
 
 SHARDS = "ledger-*-of-*.sqlite"  # matches the names that `file_of` returns
 
