@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.report.columns import Column, Score
-from posefit.statistics.means import Intervals
 
 if TYPE_CHECKING:
     from posefit.report.contest import Contest
@@ -70,8 +69,11 @@ class Kind(Protocol):
         """Return each figure of some rows, given by their indices, together."""
         ...
 
-    def intervals(self, contest: "Contest") -> Intervals:
-        """Return the score of each method that takes part, with its interval."""
+    def interval(self, contest: "Contest", place: int) -> tuple[float, float]:
+        """Return the ends of the 95 % interval of a method's score, nan if unknown.
+
+        The method is given by its place among those that take part.
+        """
         ...
 
     def baselines(self, contest: "Contest") -> "list[Baseline]":

@@ -5,8 +5,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from posefit.report.contest import Contest, contest_of
 from posefit.report.runs import Runs
 from posefit.statistics.paired import SIGNIFICANCE
@@ -130,11 +128,11 @@ def leaderboard(contest: Contest) -> list[Standing]:
     3. Methods that do not take part, with the averages of all their own runs.
     """
     kind = contest.runs.kind
-    intervals = kind.intervals(contest)
     ends = dict[int, tuple[float, float]]()
     for place, m in enumerate(contest.methods):
-        if np.isfinite(intervals.low[place]):
-            ends[m] = float(intervals.low[place]), float(intervals.high[place])
+        low, high = kind.interval(contest, place)
+        if math.isfinite(low):
+            ends[m] = low, high
 
     def badness(m: int) -> tuple[float, float]:
         """Return a key that is lower for better methods.

@@ -15,7 +15,7 @@ from posefit.report.contest import Contest
 from posefit.report.kind import Indices, Place, Row
 from posefit.report.leaderboard import Baseline, Standings
 from posefit.report.runs import Runs
-from posefit.statistics.means import Intervals, mean_intervals
+from posefit.statistics.means import mean_interval, mean_intervals
 from posefit.statistics.profiles import attained, hits
 from posefit.suites.functions import suite_function
 from posefit.suites.problem import TARGETS
@@ -127,16 +127,12 @@ class Searches:
         """Return the averages of some rows."""
         return runs.averages(rows)
 
-    def intervals(self, contest: Contest) -> Intervals:
-        """Return each method's share of targets.
-
-        The interval is the one that other instances would give.
-        """
+    def interval(self, contest: Contest, place: int) -> tuple[float, float]:
+        """Return the ends of the interval that other instances would give."""
         functions = contest.place_field("function")
         instances = contest.place_field("instance")
-        means = mean_intervals(contest.scores, functions, instances)
-        low = np.maximum(means.low, 0.0)
-        return Intervals(means.values, low, np.minimum(means.high, 100.0))
+        mean = mean_interval(contest.scores[place], functions, instances)
+        return max(mean.low, 0.0), min(mean.high, 100.0)
 
     def baselines(self, contest: Contest) -> list[Baseline]:
         """Return random search, if it takes part: its best variant."""

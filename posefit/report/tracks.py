@@ -22,7 +22,6 @@ from posefit.report.contest import Contest
 from posefit.report.kind import Indices, Place, Row
 from posefit.report.leaderboard import Baseline, Standings
 from posefit.report.runs import Runs
-from posefit.statistics.means import Intervals, block_means
 from posefit.sweep.repeat import END, TRACK_BEGIN, plan_lines, track_fields
 from posefit.sweep.table import damage, views
 from posefit.uncertainty.calibration import BINS
@@ -31,10 +30,6 @@ LOSS = "error_with_losses_degrees"
 LOSS_BASELINE = "mean_pose"  # a lost frame has at least the error of this baseline
 TABLE_LEVEL = "80"  # the level, in percent, of intervals in tables
 MAX_SEEDS = 50  # the most seeds that the facts list
-# A method that lost some tracks, but fewer than these, has no interval. So few losses
-# say little about their frequency: an interval would hold the truth in 86 to 92 % of
-# studies instead of 95 %.
-MIN_LOST = 3
 NO_MODES: Array = np.zeros((BINS, 3), dtype=np.float32)
 
 
@@ -247,17 +242,10 @@ class Tracks:
             figures[f"skill.{name}"] = _skill(figures[LOSS], baseline)
         return figures
 
-    def intervals(self, contest: Contest) -> Intervals:
-        """Return each method's mean error with its interval.
-
-        The ends are nan for a method that lost one or two tracks.
-        """
-        intervals = block_means(contest.scores, contest.instance)
-        for place, rows in enumerate(contest.blocks):
-            if 0 < (contest.runs.lost_tracks(rows) or 0) < MIN_LOST:
-                intervals.low[place] = math.nan
-                intervals.high[place] = math.nan
-        return intervals
+    def interval(self, contest: Contest, place: int) -> tuple[float, float]:
+        """Return the ends of the interval of a method's mean error."""
+        means = contest.means(place, contest.scores[place : place + 1])
+        return float(means.low[0]), float(means.high[0])
 
     def baselines(self, contest: Contest) -> list[Baseline]:
         """Return the baselines, on the same runs as the methods."""

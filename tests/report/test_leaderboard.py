@@ -147,8 +147,15 @@ def test_one_or_two_lost_tracks_give_no_interval_and_none_or_more_do(
             for i in range(4)
             for s in range(2)
         ]
-        (made_row,) = board_of(contest_of_results(tmp_path / str(lost), made))
+        contest = contest_of_results(tmp_path / str(lost), made)
+        (made_row,) = board_of(contest)
         assert (made_row["low"] is not None) == is_shown, lost
+        # nor have its curve and its joints
+        (curve,) = convergence(contest, grid(contest))
+        assert curve is not None
+        assert curve.low is not None
+        assert np.isfinite(curve.low).all() == is_shown
+        assert np.isfinite(joint_errors(contest)[0].low).all() == is_shown
 
 
 def test_curves_start_and_end_with_the_traces(tmp_path: Path) -> None:

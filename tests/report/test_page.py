@@ -1,5 +1,6 @@
 """The report in a real browser: it opens without errors, it is accessible, and its controls work."""
 
+import json
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -185,11 +186,16 @@ def test_the_first_screen_has_the_leader_the_figure_and_failures(
 def test_tables_sort_and_compare_and_mark_warnings(chromium: Any, tracks: Path) -> None:
     with shown(chromium, tracks) as page:
         heads = page.locator("#leaders th")
+        data = json.loads(page.locator("#data").text_content())
+        names = [row["name"] for row in data["leaderboard"]]
+        pairs = zip(texts(page, "#leaders", 1)[:METHODS], names, strict=True)
+        assert all(text.startswith(name) for text, name in pairs)
+        heads.nth(1).locator("button").focus()
+        page.keyboard.press("Enter")
         assert heads.nth(1).get_attribute("aria-sort") == "ascending"
         errors = [float(text) for text in texts(page, "#leaders", 2)]
         assert errors == sorted(errors)
         assert len(errors) == METHODS + 3  # and baselines
-        heads.nth(1).locator("button").focus()
         page.keyboard.press("Enter")
         assert [float(text) for text in texts(page, "#leaders", 2)] == errors[::-1]
         visible = [k for k in range(heads.count()) if heads.nth(k).is_visible()]

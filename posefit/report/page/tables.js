@@ -85,7 +85,7 @@ function table(box, columns, rows, { name, by = null, down = false, kind = () =>
 
 function leaderboard() {
   $("leaderboard-note").textContent = `${D.score.leaderboard}Click a column's title to sort by it.`;
-  const { name: score, digits, points, paired, down } = D.score;
+  const { name: score, digits, points, paired } = D.score;
   const bases = D.leaderboard[0].lost_tracks >= 0 ? D.baselines : [];
   const name = (row) => (row.baseline ? `baseline: ${row.title}` : row.name);
   const settings = (row) => make("small", {}, D.methods[row.method].settings || "default settings");
@@ -111,7 +111,7 @@ function leaderboard() {
     ),
   ];
   const kind = (row) => (row.baseline ? "base" : null);
-  table($("leaders"), columns, [...D.leaderboard, ...bases], { name: "Leaderboard", by: 1, down, kind });
+  table($("leaders"), columns, [...D.leaderboard, ...bases], { name: "Leaderboard", kind });
 }
 
 // The command that runs a row again, and a button for a command that needs no ledger.
