@@ -214,7 +214,8 @@ def test_only_damage_is_called_damage(
 def test_a_ledger_that_another_program_locks_is_in_use(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("posefit.sweep.ledger.OPEN_SECONDS", 0.01)
+    for module in ("ledger", "writer"):
+        monkeypatch.setattr(f"posefit.sweep.{module}.OPEN_SECONDS", 0.01)
     folder = filled(tmp_path / "results", 2)
     with closing(sqlite3.connect(folder / FILE, isolation_level=None)) as other:
         # so that readers have to wait, too
