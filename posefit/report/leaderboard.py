@@ -2,14 +2,12 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 from posefit.report.contest import Contest, contest_of
 from posefit.report.runs import Runs
 from posefit.statistics.paired import SIGNIFICANCE
-
-EFFECT = ("behind", "behind_low", "behind_high", "p", "blocks_needed")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,9 +29,12 @@ class Effect:
     blocks_needed: float
 
     @property
-    def is_none(self) -> bool:
+    def is_zero(self) -> bool:
         """Whether the methods are equal in all runs."""
         return self.behind_low == self.behind_high == 0.0
+
+
+EFFECT = tuple(field.name for field in fields(Effect))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -94,7 +94,7 @@ def _led(contest: Contest, worse: Sequence[Tested]) -> str:
 def _effect(contest: Contest, row: Standing, effect: Effect) -> str:
     """Return a method's name, difference from the first, interval, p and losses."""
     score = contest.runs.kind.score
-    if effect.is_none:
+    if effect.is_zero:
         return f"{row.name} (equal in all {score.paired})"
     details = [score.difference(effect.behind)]
     if math.isfinite(effect.behind_low):
@@ -122,7 +122,7 @@ def _power(contest: Contest, unclear: Sequence[Tested]) -> list[str]:
             f"{blocks} paired {score.paired} cannot show a difference between "
             f"{methods} methods: that takes at least {fewest}."
         ]
-    if all(each.is_none for _, each in unclear):
+    if all(each.is_zero for _, each in unclear):
         return []
     unit = "instances"
     if score.paired == "runs":

@@ -75,27 +75,26 @@ class Ledger:
             files.update(dict.fromkeys(_files(Path(path))))
         self.files = list(files)
         self._open: list[tuple[Path, sqlite3.Connection]] = []
-        # by key of each done or quarantined cell: its file, and whether it is done
-        self._places: dict[str, tuple[int, bool]] = {}
+        # by status: the file of each cell, by its key
+        self._files_of: dict[str, dict[str, int]] = {"done": {}, "quarantined": {}}
         with ExitStack() as opened:
             opened.callback(self.close)
             for file in self.files:
                 self._open.append((file, _reader(file)))
-            for k in range(len(self._open)):
-                self._place(k)
+            for status in self._files_of:
+                for k in range(len(self._open)):
+                    self._place(status, k)
             opened.pop_all()
 
-    def _place(self, k: int) -> None:
-        """Note the cells of file `k`.
+    def _place(self, status: str, k: int) -> None:
+        """Note the cells of file `k` with a status, unless another file has them.
 
-        If several files have a cell, the first finished one counts, else the first.
+        A cell that is done in any file is not noted as quarantined.
         """
-        query = "SELECT key, status FROM cells WHERE status != 'planned'"
-        places = {False: (k, False), True: (k, True)}  # shared, as cells are many
-        for key, status in self._query(k, query):
-            done = status == "done"
-            if key not in self._places or (done and not self._places[key][1]):
-                self._places[key] = places[done]
+        query = "SELECT key FROM cells WHERE status = ?"
+        for (key,) in self._query(k, query, status):
+            if key not in self._files_of["done"]:
+                self._files_of[status].setdefault(key, k)
 
     def __enter__(self) -> Self:
         return self
@@ -104,11 +103,11 @@ class Ledger:
         self.close()
 
     def __len__(self) -> int:
-        return sum(done for _, done in self._places.values())
+        return len(self._files_of["done"])
 
     def done(self) -> set[str]:
         """Return the keys of the finished cells."""
-        return {key for key, (_, done) in self._places.items() if done}
+        return set(self._files_of["done"])
 
     @property
     def changed(self) -> float:
@@ -166,7 +165,8 @@ class Ledger:
         Its message has a command that plans the cell again.
         """
         name = quoted(key[:8])[1:-1]
-        file = self._open[self._places[key][0]][0]
+        files = self._files_of["quarantined"] | self._files_of["done"]
+        file = self._open[files[key]][0]
         statement = f"UPDATE cells SET status = 'planned' WHERE key LIKE '{name}%'"
         return InputError(
             f"{file}: the row of cell {name} must be written by posefit: "
@@ -178,7 +178,7 @@ class Ledger:
         query = f"{SELECT} WHERE status = ? ORDER BY rowid"
         for k in range(len(self._open)):
             for key, *texts in self._query(k, query, status):
-                if self._places.get(key) != (k, status == "done"):
+                if self._files_of[status].get(key) != k:
                     continue
                 try:
                     yield _parsed_row(key, status, *texts)

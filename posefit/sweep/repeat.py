@@ -40,8 +40,8 @@ def rerun(ledger: str | Path, key: str, out: str | Path | None = None) -> list[s
         are no lines if all else is equal.
 
     Raises:
-        ValueError: No row or several have the key, or the cell cannot be planned with
-            this version of posefit.
+        ValueError: No row or several have the key, the cell cannot be planned with this
+            version of posefit, or `out` has its row already.
         KeyboardInterrupt: It was stopped before the cell had ended.
     """
     earlier = _row_of(ledger, key)
@@ -52,6 +52,12 @@ def rerun(ledger: str | Path, key: str, out: str | Path | None = None) -> list[s
         tally = swept(plan, folder, start(), interactive().log, quiet=True)
         if tally.stopped:
             raise KeyboardInterrupt
+        # otherwise the earlier row would be compared with itself
+        if not (tally.ran or tally.failed):
+            raise InputError(
+                "--out must be a new folder or a ledger without this cell, "
+                f"got {folder}, which has it"
+            )
         (cell,) = plan
         with Ledger(folder) as results:
             now = next(row for row in results.all_rows() if row["key"] == cell.key)

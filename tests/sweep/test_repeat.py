@@ -130,6 +130,17 @@ def test_a_row_is_run_again_by_the_first_digits_of_its_key(tmp_path: Path) -> No
     assert row["key"] == key
 
 
+@pytest.mark.parametrize("spec", [SEARCH, SMALL | SPECS[0]])
+def test_a_row_is_not_compared_with_itself(
+    spec: dict[str, Any], tmp_path: Path
+) -> None:
+    cell = search_of(spec) if "suite" in spec else cell_of(spec)
+    assert cell is not None
+    path = ledger(tmp_path / "results", [run_cell(cell)])
+    message = error_of("rerun", path, cell.key[:8], "--out", path)
+    assert "--out must be a new folder or a ledger without this cell" in message
+
+
 def test_differences_of_a_row_that_is_run_again_are_printed(tmp_path: Path) -> None:
     made = run_cell(cell_of(SMALL | SPECS[0]))
     iou = made["iou"]
