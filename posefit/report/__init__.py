@@ -13,11 +13,11 @@ r"""The report of a ledger: a page for any browser, figures for papers, and tabl
 | looking for | file |
 |---|---|
 | the steps of the command, and its checks | write.py |
-| the runs of a ledger as arrays, and reading them | runs.py, reading.py |
+| the runs of a ledger, their kind, and those that methods share | contest.py |
+| reading the rows of a ledger | reading.py |
 | distinct names of methods and instances | names.py |
-| what differs between tracks and single searches | kind.py, tracks.py, searches.py |
+| what differs between tracks and single searches | tracks.py, searches.py |
 | figures and the score: names, digits, averages, texts | columns.py |
-| the runs that methods share, and their tests | contest.py |
 | the rows of the leaderboard and their order | leaderboard.py |
 | the leaderboard as printed lines, CSV and LaTeX | table.py |
 | charts of the page and for papers, as numbers | charts.py |

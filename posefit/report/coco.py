@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from posefit.files import new_folder
-from posefit.report.runs import Runs
+from posefit.report.contest import Runs
 from posefit.suites.problem import TARGETS
 from posefit.suites.running import SuiteRun
 

@@ -9,10 +9,9 @@ from typing import Any
 from posefit.errors import printable
 from posefit.reading import counted
 from posefit.report.columns import LEAST_P
-from posefit.report.contest import Contest
+from posefit.report.contest import Contest, Runs
 from posefit.report.leaderboard import Standings
 from posefit.report.page import COLOUR_COUNT
-from posefit.report.runs import Runs
 from posefit.report.summary import leader_sentences, unpaired_sentence
 from posefit.statistics.paired import POWER, SIGNIFICANCE
 from posefit.sweep.ledger import Ledger
@@ -82,7 +81,7 @@ def data_of(ledger: Ledger, runs: Runs, standings: Standings | None) -> dict[str
             "baselines": [baseline.as_dict() for baseline in standings.baselines],
             "taking_part": standings.contest.methods,
         }
-    data |= kind.page(runs, standings)
+    data |= kind.page(runs, contest)
     if runs.failures:
         data["sections"] = [*data["sections"], "failures"]
     return data

@@ -1,15 +1,22 @@
-"""The methods of a sweep on the runs that they share."""
+"""The runs of a sweep, their kind, and the contest of the methods that share some.
 
-from collections.abc import Iterator
+`Runs` are all runs of a ledger. Their `Kind`, tracks or single searches, knows what
+differs between these two. A `Contest` has the runs that the methods share.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.report.runs import Runs
+from posefit.errors import printable
+from posefit.report.columns import Column, Score
+from posefit.settings import settings_text
 from posefit.statistics.means import Intervals, block_means
 from posefit.statistics.paired import PairedTest, paired_tests
 from posefit.statistics.pairing import Shared, most_shared
@@ -18,6 +25,216 @@ from posefit.statistics.pairing import Shared, most_shared
 # say little about their frequency: an interval would hold the truth in 86 to 92 % of
 # studies instead of 95 %.
 MIN_LOST = 3
+
+Place = Mapping[str, Any]  # the fields of a plan that define an instance
+Row = Mapping[str, Any]  # of a ledger
+Indices = Array | NDArray[np.int64]  # of rows
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """A baseline, on the same runs as the methods.
+
+    Attributes:
+        name: Its name in rows.
+        title: Its name on the page.
+        figures: Its figures by name, None if unknown.
+    """
+
+    name: str
+    title: str
+    figures: Mapping[str, float | None]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return everything by name."""
+        return {"baseline": self.name, "title": self.title, **self.figures}
+
+
+class Kind(Protocol):
+    """A kind of runs: `posefit.report.tracks.Tracks` or `.searches.Searches`.
+
+    Attributes:
+        name: The kind's name, in the singular.
+        noun: Its runs, in the plural.
+        title: The title of the page.
+        columns: Its figures by name.
+        score: The figure that orders the methods.
+    """
+
+    name: str
+    noun: str
+    title: str
+    columns: Mapping[str, Column]
+    score: Score
+
+    def computed(self, row: Row, /) -> dict[str, float]:
+        """Return the figures that a row of a ledger does not have itself."""
+        ...
+
+    def read(
+        self, row: Row, shared: dict[bytes, Any], /
+    ) -> tuple[Array, dict[str, Any]]:
+        """Return the figures of a row, and its other data by name.
+
+        `shared` holds arrays that many rows have in common, to save memory.
+        """
+        ...
+
+    def rank(self, place: Place) -> tuple[Any, ...]:
+        """Return the key by which instances are sorted."""
+        ...
+
+    def place_name(self, place: Place) -> str:
+        """Return an instance's name."""
+        ...
+
+    def facts(self, runs: "Runs") -> dict[str, Any]:
+        """Return the facts about the runs by their titles."""
+        ...
+
+    def tested_errors(self, contest: "Contest") -> Array:
+        """Return the errors (methods, blocks, 1) for tests. Lower is better."""
+        ...
+
+    def figures(self, runs: "Runs", rows: Indices) -> dict[str, float | None]:
+        """Return each figure of some rows, given by their indices, together."""
+        ...
+
+    def interval(self, contest: "Contest", place: int) -> tuple[float, float]:
+        """Return the ends of the 95 % interval of a method's score, nan if unknown.
+
+        The method is given by its place among those that take part.
+        """
+        ...
+
+    def baselines(self, contest: "Contest") -> list[Baseline]:
+        """Return the baselines, on the same runs as the methods."""
+        ...
+
+    def place_words(self, contest: "Contest") -> str:
+        """Return the instances of a contest in words."""
+        ...
+
+    def baseline_sentences(
+        self, contest: "Contest", first: int, baselines: Sequence[Baseline]
+    ) -> Sequence[str]:
+        """Return sentences that compare the best baseline with the first method."""
+        ...
+
+    def page(self, runs: "Runs", contest: "Contest | None", /) -> dict[str, Any]:
+        """Return the data that only pages of this kind have, with their `sections`."""
+        ...
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A quarantined cell.
+
+    Attributes:
+        name: Its method, instance and seed.
+        method: The name of its method.
+        key: The first digits of its key.
+        reasons: Why its attempts failed.
+        command: A command that runs it again.
+    """
+
+    name: str
+    method: str
+    key: str
+    reasons: tuple[str, ...]
+    command: str
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Runs:
+    """All n finished rows of a ledger, sorted by instance, method and seed.
+
+    Names are distinct, and printable on one line. The name, settings, budget, version
+    and other choices of a method distinguish methods. All other fields except the seed
+    distinguish instances.
+
+    Attributes:
+        kind: The kind of the runs.
+        version: The versions of posefit that ran them.
+        methods: The names of methods, the best mean score first.
+        variants: The fields that define each method.
+        instances: The names of instances.
+        places: The fields that define each instance.
+        method: The index (n,) of each row's method.
+        instance: The index (n,) of each row's instance.
+        seed: The index (n,) of each row's seed.
+        seeds: The seeds, rising.
+        keys: The key of each row.
+        figures: Each figure (n,) by name, nan if a row does not have it.
+        data: The other data of each row by name, see `Kind.read`.
+        warnings: The warnings of each row that has some, by its index.
+        failures: The quarantined cells.
+    """
+
+    kind: Kind
+    version: str
+    methods: tuple[str, ...]
+    variants: tuple[dict[str, Any], ...]
+    instances: tuple[str, ...]
+    places: tuple[dict[str, Any], ...]
+    method: Array
+    instance: Array
+    seed: Array
+    seeds: tuple[int, ...]
+    keys: tuple[str, ...]
+    figures: dict[str, Array]
+    data: Mapping[str, Sequence[Any]]
+    warnings: Mapping[int, tuple[str, ...]]
+    failures: tuple[Failure, ...]
+
+    def __len__(self) -> int:
+        return len(self.keys)
+
+    @property
+    def settings(self) -> list[str]:
+        """The settings of each method, as a text."""
+        return [
+            printable(", ".join(settings_text(variant["settings"])))
+            for variant in self.variants
+        ]
+
+    @cached_property
+    def failed(self) -> Counter[str]:
+        """The number of quarantined cells by the name of their method."""
+        return Counter(failure.method for failure in self.failures)
+
+    @property
+    def table_figures(self) -> list[str]:
+        """The figures in tables. Optional ones are there only if a row has them."""
+        names = []
+        for name, column in self.kind.columns.items():
+            is_missing = column.optional and np.isnan(self.figures[name]).all()
+            if column.in_tables and not is_missing:
+                names.append(name)
+        return names
+
+    @property
+    def scores(self) -> Array:
+        """The figure (n,) that orders the methods."""
+        return self.figures[self.kind.score.name]
+
+    def averages(self, rows: Indices) -> dict[str, float | None]:
+        """Return the average of each figure over some rows, given by their indices."""
+        averages = {}
+        for name, column in self.kind.columns.items():
+            averages[name] = column.average(self.figures[name][rows])
+        return averages
+
+    def lost_tracks(self, rows: Indices) -> int | None:
+        """Return how many of some rows lost frames; None if nothing can be lost."""
+        if "lost_rate" not in self.figures:
+            return None
+        return int((self.figures["lost_rate"][rows] > 0.0).sum())
+
+    def values(self, field: str) -> list[Any]:
+        """Return the distinct values of a field of methods or instances, rising."""
+        definitions = (*self.variants, *self.places)
+        return sorted({fields[field] for fields in definitions if field in fields})
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -5,8 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
-from posefit.report.contest import Contest, contest_of
-from posefit.report.runs import Runs
+from posefit.report.contest import Baseline, Contest, Runs, contest_of
 from posefit.statistics.paired import SIGNIFICANCE
 
 
@@ -78,25 +77,6 @@ class Standing:
             del values["lost_tracks"]
         effects = vars(effect) if effect else dict.fromkeys(EFFECT)
         return {**values, **figures, **effects}
-
-
-@dataclass(frozen=True)
-class Baseline:
-    """A baseline, on the same runs as the methods.
-
-    Attributes:
-        name: Its name in rows.
-        title: Its name on the page.
-        figures: Its figures by name, None if unknown.
-    """
-
-    name: str
-    title: str
-    figures: Mapping[str, float | None]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return everything by name."""
-        return {"baseline": self.name, "title": self.title, **self.figures}
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,9 +9,8 @@ from posefit.arrays import Array
 from posefit.errors import InputError, printable
 from posefit.reading import quoted, suggestion
 from posefit.report.columns import listed
-from posefit.report.kind import Kind
+from posefit.report.contest import Failure, Kind, Runs
 from posefit.report.names import distinct
-from posefit.report.runs import Failure, Runs
 from posefit.report.searches import SEARCHES
 from posefit.report.tracks import TRACKS
 from posefit.settings import setting_text

@@ -1,6 +1,6 @@
 """Single searches in a report: their figures, names, intervals, baseline and page."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,10 +11,7 @@ from posefit.evaluation.measures import Measure
 from posefit.reading import counted
 from posefit.report.charts import Chart, Line
 from posefit.report.columns import Column, Score, listed, median
-from posefit.report.contest import Contest
-from posefit.report.kind import Indices, Place, Row
-from posefit.report.leaderboard import Baseline, Standings
-from posefit.report.runs import Runs
+from posefit.report.contest import Baseline, Contest, Indices, Place, Row, Runs
 from posefit.statistics.means import mean_interval, mean_intervals
 from posefit.statistics.profiles import attained, hits
 from posefit.suites.functions import suite_function
@@ -157,27 +154,28 @@ class Searches:
         words += f" in {listed(dimensions, len(dimensions))} dimensions"
         return f"{words}, {counted(len(problems), 'instance')} in all"
 
-    def baseline_sentences(self, standings: Standings) -> list[str]:
+    def baseline_sentences(
+        self, contest: Contest, first: int, baselines: Sequence[Baseline]
+    ) -> list[str]:
         """Return a sentence about the share of targets that random search reached."""
-        variants = standings.contest.runs.variants
-        if variants[standings.board[0].method]["method"] == RANDOM:
+        if contest.runs.variants[first]["method"] == RANDOM:
             return ["That is random search: no method does better."]
         sentences = []
-        for baseline in standings.baselines:
+        for baseline in baselines:
             if (share := baseline.figures[SCORE.name]) is not None:
                 sentences.append(f"Random search reached {SCORE.text(share)}.")
         return sentences
 
-    def page(self, _: Runs, standings: Standings | None, /) -> dict[str, Any]:
+    def page(self, _: Runs, contest: Contest | None, /) -> dict[str, Any]:
         """Return the curves, the running times and the list of sections."""
-        if standings is None:
+        if contest is None:
             return {"sections": []}
-        charts = search_charts(standings.contest)
+        charts = search_charts(contest)
         return {
             "sections": ["leaderboard", "curves", "times"],
             "charts": [chart.as_dict() for chart in charts],
             "above": SHOWN,
-            "times": running_times(standings.contest),
+            "times": running_times(contest),
         }
 
 

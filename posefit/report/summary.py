@@ -53,7 +53,7 @@ def leader_sentences(standings: Standings) -> list[str]:
     elif not tested:
         noun = kind.score.paired[:-1]
         sentences.append(f"One shared {noun} shows no difference between methods.")
-    sentences += kind.baseline_sentences(standings)
+    sentences += kind.baseline_sentences(contest, first.method, standings.baselines)
     return [*map(printable, sentences)]
 
 

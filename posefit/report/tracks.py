@@ -18,10 +18,7 @@ from posefit.measuring.centres import PLACES
 from posefit.reading import counted
 from posefit.report import charts
 from posefit.report.columns import NAMED, Column, Score, listed
-from posefit.report.contest import Contest
-from posefit.report.kind import Indices, Place, Row
-from posefit.report.leaderboard import Baseline, Standings
-from posefit.report.runs import Runs
+from posefit.report.contest import Baseline, Contest, Indices, Place, Row, Runs
 from posefit.sweep.repeat import END, TRACK_BEGIN, plan_lines, track_fields
 from posefit.sweep.table import damage, views
 from posefit.uncertainty.calibration import BINS
@@ -265,26 +262,27 @@ class Tracks:
         names = listed(motions) if len(motions) <= NAMED else f"{len(motions)} motions"
         return f"{counted(len(contest.instances), 'instance')} of {names}"
 
-    def baseline_sentences(self, standings: Standings) -> list[str]:
+    def baseline_sentences(
+        self, contest: Contest, first: int, baselines: Sequence[Baseline]
+    ) -> list[str]:
         """Return a sentence that compares the best baseline with the first method."""
         known = []
-        for baseline in standings.baselines:
+        for baseline in baselines:
             if (error := baseline.figures[LOSS]) is not None:
                 known.append((error, baseline.title))
-        first = standings.board[0].figures[LOSS]
-        if not known or first is None:
+        own = contest.runs.averages(contest.rows_of(first))[LOSS]
+        if not known or own is None:
             return []
         error, title = min(known, key=itemgetter(0))
-        if error > first:
+        if error > own:
             return [f"The best baseline, the {title}, has {SCORE.text(error)}."]
         return [f"It does not beat the baselines: the {title} has {SCORE.text(error)}."]
 
-    def page(self, runs: Runs, standings: Standings | None, /) -> dict[str, Any]:
+    def page(self, runs: Runs, contest: Contest | None, /) -> dict[str, Any]:
         """Return the charts, the joints, the uncertainty, the rows and the sections."""
         sections = ["rows"] if len(runs) else []
         part: dict[str, Any] = {}
-        if standings is not None:
-            contest = standings.contest
+        if contest is not None:
             joints = charts.joint_errors(contest)
             certainty = charts.certainty(contest)
             chart_sections = ["leaderboard", "comparison", "curves"]

@@ -10,7 +10,7 @@ from posefit.page.document import plain
 from posefit.reading import cut
 from posefit.report.coco import write_coco
 from posefit.report.content import data_of
-from posefit.report.kind import Kind
+from posefit.report.contest import Kind
 from posefit.report.leaderboard import standings_of
 from posefit.report.page import MARK, document
 from posefit.report.reading import runs_of

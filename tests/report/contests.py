@@ -5,10 +5,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from posefit.report.contest import Contest, contest_of
+from posefit.report.contest import Contest, Runs, contest_of
 from posefit.report.leaderboard import Standings, leaderboard
 from posefit.report.reading import runs_of
-from posefit.report.runs import Runs
 from posefit.report.summary import leader_sentences
 from posefit.sweep.ledger import Ledger
 from tests.report.browser import ledger, result
