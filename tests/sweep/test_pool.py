@@ -24,12 +24,8 @@ from posefit.sweep.drive import Tally, drive
 from posefit.sweep.engine import Engine, Limits, Outcome
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
-<<<<<<< HEAD
 from posefit.sweep.pool import Pool
-=======
-from posefit.sweep.pool import Pool, cores
 from posefit.sweep.schema import FILE
->>>>>>> 682e28b6 (The ledger is split by subject; rows of the leaderboard are typed; constants of the page have one definition)
 from posefit.sweep.worker import _Process, become_worker
 from posefit.sweep.writer import ATTEMPTS, Writer
 from posefit.version import posefit_build
