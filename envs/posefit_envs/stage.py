@@ -122,14 +122,14 @@ class FirstScenes:
         """Return the scene of an instance."""
         row = number - self._split.start
         self._make(row)
-        return SceneRow(*[column[row] for column in self._columns])
+        return _read(self._columns, row)
 
     def scenes(self, numbers: Rows) -> SceneRow:
         """Return the scenes of instances as columns, a row for each number (m,)."""
         rows = numbers - self._split.start
         for row in rows[~self._made[rows]].tolist():
             self._make(row)
-        return SceneRow(*[column[rows] for column in self._columns])
+        return _read(self._columns, rows)
 
     def _make(self, row: int) -> None:
         if not self._made[row]:
@@ -166,6 +166,12 @@ def _is_small(world: World) -> bool:
 def _made_scene(world: World, number: int) -> SceneRow:
     made = instance(world, number)
     return SceneRow.of(made.cost(0, first_space(world, made)), made.truth.poses[0])
+
+
+def _read(columns: SceneRow, rows: int | Rows) -> SceneRow:
+    """Return a scene of columns, or columns of m scenes."""
+    arrays: Sequence[Any] = columns
+    return SceneRow(*[column[rows] for column in arrays])
 
 
 def _write(columns: SceneRow, rows: int | Rows, scenes: SceneRow) -> None:
