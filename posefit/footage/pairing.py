@@ -41,7 +41,10 @@ def _mistaken_for_calibration(path: Path) -> str:
     """Return what a path is if it cannot be a calibration, or else ""."""
     suffix = path.suffix.lower()
     if suffix in ARRAYS:
-        return "a file of masks"
+        return (
+            "arrays: a calibration is a text, as json.dump({name: array.tolist() for "
+            "name, array in numpy.load(FILE).items()}, ...) writes it"
+        )
     if suffix in IMAGES:
         return "an image"
     return "a folder" if path.is_dir() else ""

@@ -102,7 +102,11 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
             f"{path}: expected a calibration{written_by}, got {reason}"
         ) from None
     if not calibrations:
-        raise InputError(f"{path}: expected a calibration with a camera, got none")
+        among = f" among {cut(', '.join(map(quoted, content.values)))}"
+        raise InputError(
+            f"{path}: expected a calibration with a camera, got none"
+            f"{among if content.values else ''}"
+        )
     if not chosen:
         return calibrations
     names = [calibration.name for calibration in calibrations]
