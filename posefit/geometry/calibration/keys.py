@@ -99,7 +99,7 @@ def check_others(name: str, others: Mapping[str, Any], *, placed: bool = False) 
             # not deeper: aliases in YAML may repeat one table again and again
             inner = {k: v for k, v in value.items() if not isinstance(v, dict)}
             _check_suspects(name, inner, placed=placed)
-        elif not _is_harmless(word, value) and (
+        elif not _is_harmless(word) and (
             counts(value) or (_CONVENTION.fullmatch(word) and says(value))
         ):
             raise InputError(
@@ -108,7 +108,7 @@ def check_others(name: str, others: Mapping[str, Any], *, placed: bool = False) 
             )
 
 
-def _is_harmless(word: str, value: Any) -> bool:
+def _is_harmless(word: str) -> bool:
     # `_check_suspects` found no numbers in a key that matches `_SUSPECT`
     return bool(_SUSPECT.fullmatch(word) or _HARMLESS.fullmatch(word))
 
