@@ -4,6 +4,8 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from posefit.errors import InputError
 from posefit.footage.images import IMAGES
 from posefit.footage.readers import ARRAYS
@@ -89,12 +91,29 @@ def calibrated(
             "camera must say where each of several cameras stands, got a file without "
             "rotation"
         )
+    if views > 1:
+        _check_places(known)
     if views > 1 and len(names) == views:
         known = [known[k] for k in order_by_name(known, names)]
     for camera, size in zip(known, filmed, strict=False):
         if isinstance(camera, Calibration) and size is not None:
             fitting(camera, size, scaled=False)
     return known
+
+
+def _check_places(cameras: Sequence[Camera | Calibration]) -> None:
+    """Raise InputError if two cameras are at one place and look the same way."""
+    seen = list[tuple[bytes, str]]()
+    for number, camera in enumerate(cameras, 1):
+        place = np.hstack([camera.rotation, np.reshape(camera.translation, (3, 1))])
+        name = camera.name if isinstance(camera, Calibration) else f"camera {number}"
+        for other, its_name in seen:
+            if other == place.tobytes():
+                raise InputError(
+                    "cameras must stand at different places, got one place and one "
+                    f"direction for {its_name} and {name}"
+                )
+        seen.append((place.tobytes(), name))
 
 
 def order_by_name(

@@ -206,6 +206,23 @@ def test_other_pictures_with_masks_are_refused(
         read_masks(tmp_path, ALL)
 
 
+@each("suffix", [".png", ".jpg", ".webp"])
+def test_images_that_are_to_be_turned_are_turned(
+    walk: list[Any], tmp_path: Path, suffix: str
+) -> None:
+    turned = Image.Exif()
+    turned[0x0112] = 6  # a quarter to the right
+    options = {"lossless": True} if suffix == ".webp" else {}
+    for k, mask in enumerate(walk):
+        image = drawn([np.rot90(mask)])[0]
+        image.save(tmp_path / f"{k}{suffix}", exif=turned, **options)
+    view = read_masks(tmp_path, ALL)
+    for k, mask in enumerate(walk):
+        shown = view.silhouette(k).mask
+        assert shown.shape == mask.shape
+        assert (shown != mask).mean() < (1e-3 if suffix == ".jpg" else 1e-9)
+
+
 def test_images_of_two_folders_are_not_one_camera(
     walk: list[Any], tmp_path: Path
 ) -> None:
