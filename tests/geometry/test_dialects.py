@@ -121,6 +121,36 @@ def test_a_key_that_a_program_does_not_write_is_refused_by_name(
     assert repr(key) in message
 
 
+@each("angle", [40.0, 0.0, -0.5, 3.2])
+def test_an_angle_of_view_is_less_than_half_a_turn(
+    tmp_path: Path, angle: float
+) -> None:
+    values = json.loads(programs.nerf(camera_angle_x=angle))
+    del values["fl_x"], values["fl_y"]
+    assert f"a camera_angle_x of {angle:g}" in refused(tmp_path, json.dumps(values))
+
+
+@each("order", [1, -1])
+def test_metashapes_initial_calibration_is_not_the_adjusted_one(
+    tmp_path: Path, order: int
+) -> None:
+    text = programs.metashape()
+    start, end = text.index("<calibration"), text.index("</calibration>")
+    adjusted = text[start:end] + "</calibration>"
+    initial = adjusted.replace("adjusted", "initial").replace("500", "900")
+    both = "".join([initial, adjusted][::order])
+    one = one_of(tmp_path, text.replace(adjusted, both), ".xml")
+    np.testing.assert_allclose(np.diag(one.matrix), [500.0, 500.0, 1.0])
+    turned = text.replace("</transform>", "</transform><orientation>6</orientation>", 1)
+    assert "'orientation' of 'left'" in refused(tmp_path, turned, ".xml")
+
+
+@each("key", ["ORIENTATION", "POSITION", "PRINCIPAL_POINT", "FOCAL_LENGTH"])
+def test_what_a_vicon_camera_lacks_is_named(tmp_path: Path, key: str) -> None:
+    text = programs.vicon().replace(f" {key}=", f" {key}_ID=")
+    assert f"the camera 'left' without {key}" in refused(tmp_path, text, ".xcp")
+
+
 # a program by whose files no text is taken for a model of the lens
 @each("program", sorted({*SAMPLES} - {"Vicon", "Metashape"}))
 @each("model", ["fisheye", "SIMPLE_RADIAL_FISHEYE", "Fisheye624", "omni"])

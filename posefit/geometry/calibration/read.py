@@ -97,6 +97,8 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
         cv2.error,
     ) as error:
         cause = " ".join(str(error).split()) or type(error).__name__
+        # the reader of posefit's own cameras names the file, too
+        cause = cause.removeprefix(f"{path}: ")
         reason = cut(f"no {cause}" if isinstance(error, KeyError) else cause, MESSAGE)
         raise InputError(
             f"{path}: expected a calibration{written_by}, got {reason}"
