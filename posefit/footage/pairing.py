@@ -105,7 +105,9 @@ def _check_places(cameras: Sequence[Camera | Calibration]) -> None:
     """Raise InputError if two cameras are at one place and look the same way."""
     seen = list[tuple[bytes, str]]()
     for number, camera in enumerate(cameras, 1):
-        place = np.hstack([camera.rotation, np.reshape(camera.translation, (3, 1))])
+        if camera.rotation is None or camera.translation is None:
+            continue
+        place = np.column_stack([camera.rotation, camera.translation])
         name = camera.name if isinstance(camera, Calibration) else f"camera {number}"
         for other, its_name in seen:
             if other == place.tobytes():
