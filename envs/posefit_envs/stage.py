@@ -142,8 +142,11 @@ _first_scenes = lru_cache(maxsize=REMEMBERED_WORLDS)(FirstScenes)
 
 
 def first_scene(world: World, number: int) -> SceneRow:
-    """Return the scene of an instance's first frame. Small scenes are cached."""
-    if _is_small(world):
+    """Return the scene of an instance's first frame.
+
+    Small scenes of the world's own split are cached.
+    """
+    if _is_small(world) and number in SPLITS[world.split]:
         return _first_scenes(world.default_infos).scene(number)
     return _made_scene(world, number)
 
