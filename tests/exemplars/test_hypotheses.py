@@ -11,9 +11,7 @@ from posefit.fitting.tracker import Task
 from posefit.geometry.skeleton import JOINTS, LIMBS, angles_of
 from posefit.motion import built_in
 from posefit.silhouette.mask import Silhouette
-from posefit_exemplars.cost_model import (
-    motion_step_costs,
-)
+from posefit_exemplars.cost_model import PARTS, motion_step_costs
 from posefit_exemplars.estimate import Estimate
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import SAME_DISTANCE, Hypotheses
@@ -45,10 +43,36 @@ def test_what_steps_cost_by_hand() -> None:
     # it goes on as it does
     np.testing.assert_allclose(cost(0.0, 0.06, 0.06, 0.06), 0.0, atol=1e-5)
     np.testing.assert_allclose(cost(0.1, 0.0, 0.1, 0.0), 0.0, atol=1e-5)
-    # off by a spread: a half
-    np.testing.assert_allclose(cost(0.0, 0.06, 0.09, 0.06), 0.5, atol=1e-5)
-    # at rest, then at a spread's rate: 0.015 off and the rates a spread apart
-    np.testing.assert_allclose(cost(0.0, 0.0, 0.0, 0.03), 1 / 8 + 1 / 2, atol=1e-5)
+    # it stops for a frame, at speed 0
+    np.testing.assert_allclose(cost(0.0, 0.06, 0.0, 0.06), 0.3, atol=1e-5)
+    # half as fast
+    np.testing.assert_allclose(cost(0.0, 0.06, 0.03, 0.06), 0.1, atol=1e-5)
+    # off by a spread, a half; at the speed 1.4 it is off by 0.09 - 0.084: 0.02 and 0.15
+    np.testing.assert_allclose(cost(0.0, 0.06, 0.09, 0.06), 0.17, atol=1e-5)
+    # at rest, then at a spread's rate: 0.015 off and the rates a spread apart, an eighth
+    # and a half; at speed 0.5, 0.0075 off and half the rates, and 0.1
+    np.testing.assert_allclose(
+        cost(0.0, 0.0, 0.0, 0.03), 1 / 32 + 1 / 8 + 0.1, atol=1e-5
+    )
+
+
+def test_every_joint_is_in_one_part() -> None:
+    assert sorted(np.concatenate(PARTS)) == list(range(len(JOINTS)))
+
+
+def test_each_limb_changes_its_speed_by_itself() -> None:
+    def both(wrist: tuple[float, float], ankle: tuple[float, float]) -> Hypotheses:
+        one = single(*wrist)
+        other = single(*ankle, joint="rfoot")
+        return one._replace(
+            joints=one.joints + other.joints, rates=one.rates + other.rates
+        )
+
+    before = both((0.0, 0.06), (0.0, 0.06))
+    # the arm stops, and the leg goes on
+    after = both((0.0, 0.0), (0.06, 0.06))
+    costs = motion_step_costs(0.03, before, after)
+    np.testing.assert_allclose(costs, [[0.3]], atol=1e-5)
 
 
 def test_legs_of_one_clip_go_with_the_arms_of_another() -> None:
