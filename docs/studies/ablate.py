@@ -149,6 +149,7 @@ MECHANISMS: Mapping[str, Change] = {
         "cost_model.DEPTH_SPREAD": OFF,
     },
     "no search everywhere after the first frame": {"path.SEARCHES_PER_SECOND": TINY},
+    "parts go on at their speed": {"cost_model.SPEED_COSTS": {1.0: 0.0}},
     "no jumps": {"cost_model.JUMP_COST": 1e4},
     "near hypotheses are not one": {"hypotheses.same_distance": lambda _cameras: 1e-4},
     "the beam has all evaluations but a fit": {"tracker.FIT_SHARE": 0.3},
