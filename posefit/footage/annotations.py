@@ -30,6 +30,7 @@ from posefit.footage.views import (
     check_some,
     empty_planes,
     known_planes,
+    release,
     span,
     times_of,
 )
@@ -88,6 +89,7 @@ def read_annotations(
             for shape in content.shapes[images[str(file)]["id"]]:
                 mask |= content.mask(shape, size)
         bits[k] = np.packbits(mask)
+        release(bits, k)
     check_some(str(path), there, start)
     numbers = np.arange(start, stop)
     return View(
