@@ -14,6 +14,7 @@ from posefit.report.columns import listed
 from posefit.report.contest import Kind, Runs
 from posefit.report.repeat import repeat_command
 from posefit.report.searches import SEARCHES
+from posefit.report.stored import Ordered, Store
 from posefit.report.tracks import TRACKS
 from posefit.settings import setting_text
 from posefit.sweep.cell import cell_from, other_version
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from posefit.sweep.ledger import Ledger
 
 KINDS: dict[str, Kind] = {kind.name: kind for kind in (TRACKS, SEARCHES)}
+KEY_LENGTH = 8  # characters of a key that distinguish runs on a page
 # the fields that define a method; all others except the seed define an instance
 _METHOD_FIELDS = (
     "method",
@@ -61,20 +63,23 @@ class _Rows:
     def __init__(self, ledger: "Ledger") -> None:
         self.methods = _Distinct()
         self.places = _Distinct()
-        # of each finished row
-        self.method: list[int] = []
-        self.place: list[int] = []
-        self.seeds: list[int] = []  # of any size, so not an array
-        self.keys: list[str] = []
-        self.warnings: list[tuple[str, ...]] = []
-        # one after the other: an array for each of a million rows takes twice as much
-        self.figures = array("d")
-        self.data: list[tuple[Any, ...]] = []
+        # of each finished row; arrays, because there may be a million
+        self.method = array("q")
+        self.place = array("q")
+        self.seed = array("q")  # its place in `seeds`
+        self.keys = bytearray()  # eight characters each
+        self.figures: dict[str, array[float]] = {}
+        self.data: dict[str, Store] = {}
+        self.seeds: dict[int, int] = {}  # in their order, of any size
+        self.warnings: dict[int, tuple[str, ...]] = {}  # by the row's index
         self.quarantined = ledger.quarantined()
-        shared: dict[bytes, Any] = {}  # arrays that many rows have in common
         kinds = set[str]()
         for row in chain(ledger.rows(), self.quarantined):
             kinds.add(row["spec"]["kind"])
+            if not self.figures:
+                kind = KINDS[row["spec"]["kind"]]
+                self.figures = {name: array("d") for name in kind.columns}
+                self.data = {name: store() for name, store in kind.data.items()}
             if len(kinds) > 1:
                 raise InputError(
                     f"{ledger.path}: expected a ledger of either tracks or single "
@@ -82,7 +87,7 @@ class _Rows:
                 )
             if row["status"] == "done":
                 try:
-                    self._add(row, shared)
+                    self._add(row)
                 # raised if a figure is missing or has another type
                 except (ValueError, TypeError, LookupError, AttributeError) as error:
                     raise ledger.damaged_row(row["key"], error) from None
@@ -97,16 +102,22 @@ class _Rows:
             self.methods.number(_variant(cell["spec"])) for cell in self.quarantined
         ]
 
-    def _add(self, row: Mapping[str, Any], shared: dict[bytes, Any]) -> None:
+    def _add(self, row: Mapping[str, Any]) -> None:
         spec = row["spec"]
-        figures, data = KINDS[spec["kind"]].read(row, shared)
-        self.figures.extend(figures.tolist())
-        self.data.append(data)
+        figures, data = KINDS[spec["kind"]].read(row)
+        warnings = tuple(map(printable, row["warnings"]))
+        if warnings:
+            self.warnings[len(self.method)] = warnings
+        for column, figure in zip(self.figures.values(), figures.tolist(), strict=True):
+            column.append(figure)
+        for stored, value in zip(self.data.values(), data, strict=True):
+            stored.append(value)
         self.method.append(self.methods.number(_variant(spec)))
         self.place.append(self.places.number(_place(spec)))
-        self.seeds.append(int(spec["seed"]))
-        self.keys.append(row["key"])
-        self.warnings.append(tuple(map(printable, row["warnings"])))
+        seed = int(spec["seed"])
+        self.seed.append(self.seeds.setdefault(seed, len(self.seeds)))
+        key = row["key"].encode("ascii", "replace")
+        self.keys += key[:KEY_LENGTH].ljust(KEY_LENGTH, b"\0")
 
 
 def runs_of(
@@ -132,38 +143,38 @@ def runs_of(
     """
     rows = _Rows(ledger)
     kind = rows.kind
-    figures = np.asarray(rows.figures).reshape(-1, len(kind.columns))
-    score = figures[:, list(kind.columns).index(kind.score.name)]
+    score = np.array(rows.figures[kind.score.name], dtype=np.float64)
     label_of = _labels(rows, score, latest)
     chosen = _named(methods, label_of, rows) if methods else list(label_of)
     finished = [m for m in chosen if m < rows.finished_methods]
 
     # the rows of these methods, sorted by instance, method and seed
-    retained = set(finished)
-    numbers = [k for k, m in enumerate(rows.method) if m in retained]
+    method_of_row = np.array(rows.method, dtype=np.int64)
+    numbers = np.flatnonzero(np.isin(method_of_row, finished))
+    place_of_row = np.array(rows.place, dtype=np.int64)[numbers]
+    seed_of_row = np.array(rows.seed, dtype=np.int64)[numbers]
     places = rows.places.values
     place_order = sorted(
-        {rows.place[k] for k in numbers},
+        np.unique(place_of_row).tolist(),
         key=lambda i: (kind.rank(places[i]), _text(places[i])),
     )
-    seeds = sorted({rows.seeds[k] for k in numbers})
-
-    def ranks(values: Sequence[int], order: Sequence[int]) -> "Array":
-        """Return the places of these rows' values in an order."""
-        rank = {value: place for place, value in enumerate(order)}
-        return np.array([rank[values[k]] for k in numbers], dtype=int)
-
-    instance = ranks(rows.place, place_order)
-    method = ranks(rows.method, finished)
-    seed = ranks(rows.seeds, seeds)
+    all_seeds = list(rows.seeds)
+    seed_order = sorted(np.unique(seed_of_row).tolist(), key=all_seeds.__getitem__)
+    instance = _ranks(place_of_row, place_order)
+    method = _ranks(method_of_row[numbers], finished)
+    seed = _ranks(seed_of_row, seed_order)
     order = np.lexsort((seed, method, instance))
-    numbers = [numbers[k] for k in order.tolist()]
+    numbers = numbers[order]
 
-    columns = zip(*(rows.data[k] for k in numbers), strict=True)
+    figures = {}
+    for name in list(rows.figures):
+        # one at a time, because two copies of all take much memory
+        figures[name] = np.array(rows.figures.pop(name), dtype=np.float64)[numbers]
     warnings = {}
-    for place, k in enumerate(numbers):
-        if rows.warnings[k]:
-            warnings[place] = rows.warnings[k]
+    if rows.warnings:
+        for place, k in enumerate(numbers.tolist()):
+            if k in rows.warnings:
+                warnings[place] = rows.warnings[k]
     failures = []
     for cell, m in zip(rows.quarantined, rows.failed_method, strict=True):
         if m in chosen:
@@ -178,14 +189,20 @@ def runs_of(
         method=method[order],
         instance=instance[order],
         seed=seed[order],
-        seeds=tuple(seeds),
-        keys=tuple(rows.keys[k] for k in numbers),
-        figures=dict(zip(kind.columns, figures[numbers].T, strict=True)),
-        # without rows there are no columns
-        data=dict(zip(kind.data, columns, strict=False)),
+        seeds=tuple(all_seeds[k] for k in seed_order),
+        keys=np.frombuffer(rows.keys, f"S{KEY_LENGTH}")[numbers],
+        figures=figures,
+        data={name: Ordered(store, numbers) for name, store in rows.data.items()},
         warnings=warnings,
         failures=tuple(failures),
     )
+
+
+def _ranks(values: "Array", order: Sequence[int]) -> "Array":
+    """Return the places of values (n,) in an order of all that occur."""
+    rank = np.zeros(max(order, default=-1) + 1, dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    return np.asarray(rank[values])
 
 
 def _labels(rows: _Rows, score: "Array", latest: bool) -> dict[int, str]:

@@ -4,11 +4,13 @@
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.evaluation.measures import BASELINES, MEASURES, Measure
@@ -20,6 +22,7 @@ from posefit.report.columns import NAMED, Column, Score, listed, mean
 from posefit.report.contest import Contest, Place, Row, Runs
 from posefit.report.leaderboard import paired_tests_of
 from posefit.report.repeat import command_head
+from posefit.report.stored import Packed, Store, Traces
 from posefit.statistics.means import block_means
 from posefit.sweep.table import damage, views
 from posefit.uncertainty.calibration import BINS
@@ -165,23 +168,18 @@ class Tracks:
     named: tuple[str, ...] = ("motion", "view_degrees", "corruption", "instance")
     # errors of joints (27,) in mm; modes (bins, 3), see `_binned`; evaluations and
     # costs
-    data: tuple[str, ...] = ("joint_errors", "modes", "traces")
+    data: Mapping[str, Callable[[], Store]] = MappingProxyType(
+        {"joint_errors": Packed, "modes": list, "traces": Traces}
+    )
     baselines: Mapping[str, str] = BASELINES
 
     def computed(self, row: Row, /) -> dict[str, float]:
         """Return the error with losses of a row."""
         return {LOSS: error_with_losses(row)}
 
-    def read(
-        self, row: Row, shared: dict[bytes, Any], /
-    ) -> tuple[Array, tuple[Any, ...]]:
-        """Return the figures of a row and its other data.
-
-        `shared` holds arrays that many rows have in common, to save memory.
-        """
+    def read(self, row: Row, /) -> tuple[Array, tuple[Any, ...]]:
+        """Return the figures of a row and its other data."""
         used = np.array(row["trace"]["evaluations"], np.float32)
-        # many rows have the same evaluations in their traces
-        used = shared.setdefault(used.tobytes(), used)
         trace = used, np.array(row["trace"]["cost"], np.float32)
         joints = np.array(row["joint_errors_mm"], dtype=np.float32)
         row = {**row, **self.computed(row)}
@@ -328,7 +326,7 @@ class Tracks:
             "head": head,
             "seed": runs.seed,
             **{name: runs.figures[name] for name in runs.table_figures},
-            "key": [key[:8] for key in runs.keys],
+            "key": runs.keys.astype(str),
         }
         return {
             **part,
@@ -341,18 +339,22 @@ class Tracks:
         }
 
 
-def _heads(runs: Runs) -> tuple[list[str], list[int]]:
+def _heads(runs: Runs) -> tuple[list[str], NDArray[np.int64]]:
     """Return the beginnings of the commands that run rows again, and each row's index.
 
     Rows that differ only in their last fields have the same beginning.
     """
-    pairs = list(zip(runs.method.tolist(), runs.instance.tolist(), strict=True))
-    commands = {}
-    for m, i in set(pairs):
-        commands[m, i] = command_head({**runs.variants[m], **runs.places[i]})
-    heads = sorted(set(commands.values()))
+    # a number for each pair of a method and an instance
+    numbers = runs.method * len(runs.places) + runs.instance
+    pairs, pair_of_row = np.unique(numbers, return_inverse=True)
+    commands = []
+    for number in pairs.tolist():
+        m, i = divmod(number, len(runs.places))
+        commands.append(command_head({**runs.variants[m], **runs.places[i]}))
+    heads = sorted(set(commands))
     index = {head: k for k, head in enumerate(heads)}
-    return heads, [index[commands[pair]] for pair in pairs]
+    of_pairs = np.array([index[command] for command in commands], dtype=np.int64)
+    return heads, of_pairs[pair_of_row]
 
 
 def _binned(modes: Sequence[Sequence[float]]) -> Array:

@@ -26,8 +26,10 @@ import shlex
 import socket
 import sqlite3
 import stat
+from array import array
+from bisect import bisect_left
 from collections import Counter
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -140,27 +142,32 @@ class Ledger:
             files.update(dict.fromkeys(_files(Path(path))))
         self.files = list(files)
         self._open: list[tuple[Path, sqlite3.Connection]] = []
-        # by key of each done or quarantined cell: its file, and whether it is done
-        self._places: dict[str, tuple[int, bool]] = {}
+        # The cells that are done or quarantined now, by file and status: their rowids,
+        # rising. Keys of a million cells would take much memory.
+        self._counted: dict[tuple[int, str], array[int]] = {}
         with ExitStack() as opened:
             opened.callback(self.close)
             for file in self.files:
                 self._open.append((file, _reader(file)))
-            for k in range(len(self._open)):
-                self._place(k)
+            self._count()
             opened.pop_all()
 
-    def _place(self, k: int) -> None:
-        """Note the cells of file `k`.
+    def _count(self) -> None:
+        """Note the cells that count.
 
         If several files have a cell, the first finished one counts, else the first.
         """
-        query = "SELECT key, status FROM cells WHERE status != 'planned'"
-        places = {False: (k, False), True: (k, True)}  # shared, as cells are many
-        for key, status in self._query(k, query):
-            done = status == "done"
-            if key not in self._places or (done and not self._places[key][1]):
-                self._places[key] = places[done]
+        several = len(self._open) > 1
+        seen = set[str]()
+        for status in ("done", "quarantined"):
+            for k in range(len(self._open)):
+                counted = self._counted[k, status] = array("q")
+                for rowid, key in self._query(k, f"SELECT rowid, key {OF}", status):
+                    if several and key in seen:
+                        continue
+                    if several:
+                        seen.add(key)
+                    counted.append(rowid)
 
     def __enter__(self) -> Self:
         return self
@@ -169,11 +176,15 @@ class Ledger:
         self.close()
 
     def __len__(self) -> int:
-        return sum(done for _, done in self._places.values())
+        return sum(len(self._counted[k, "done"]) for k in range(len(self._open)))
 
     def done(self) -> set[str]:
         """Return the keys of the finished cells."""
-        return {key for key, (_, done) in self._places.items() if done}
+        done = set[str]()
+        for k in range(len(self._open)):
+            for _, key in self._chosen(k, "key", "done"):
+                done.add(key)
+        return done
 
     @property
     def changed(self) -> float:
@@ -231,7 +242,12 @@ class Ledger:
         Its message has a command that plans the cell again.
         """
         name = quoted(key[:8])[1:-1]
-        file = self._open[self._places[key][0]][0]
+        file = self.files[0]
+        query = "SELECT rowid, status FROM cells WHERE key = ?"
+        for k, (path, _) in enumerate(self._open):
+            for rowid, status in self._query(k, query, key):
+                if _is_in(rowid, self._counted.get((k, status), [])):
+                    file = path
         statement = f"UPDATE cells SET status = 'planned' WHERE key LIKE '{name}%'"
         return InputError(
             f"{file}: the row of cell {name} must be written by posefit: "
@@ -240,15 +256,21 @@ class Ledger:
         )
 
     def _rows(self, status: str) -> Iterator[dict[str, Any]]:
-        query = f"{SELECT} WHERE status = ? ORDER BY rowid"
         for k in range(len(self._open)):
-            for key, *texts in self._query(k, query, status):
-                if self._places.get(key) != (k, status == "done"):
-                    continue
+            columns = "key, spec, faults, row"
+            for _, key, *texts in self._chosen(k, columns, status):
                 try:
                     yield _parsed_row(key, status, *texts)
                 except (ValueError, TypeError, KeyError, RecursionError) as error:
                     raise self.damaged_row(str(key), error) from None
+
+    def _chosen(self, k: int, columns: str, status: str) -> Iterator[Any]:
+        """Yield the rowid and columns of the cells of a file that count."""
+        counted = self._counted[k, status]
+        for row in self._query(k, f"SELECT rowid, {columns} {OF}", status):
+            # a driver may have finished others since the ledger was opened
+            if _is_in(row[0], counted):
+                yield row
 
     def _query(self, k: int, query: str, *values: Any) -> Iterator[Any]:
         file, database = self._open[k]
@@ -258,12 +280,18 @@ class Ledger:
             raise _unusable(file, error) from None
 
 
-SELECT = "SELECT key, spec, faults, row FROM cells"
+OF = "FROM cells WHERE status = ? ORDER BY rowid"  # the end of most queries
 # the versions of the finished cells, with their numbers
 VERSIONS = """
     SELECT json_extract(spec, '$.version'), count(*) FROM cells
     WHERE status = 'done' AND json_valid(spec) GROUP BY 1
 """
+
+
+def _is_in(rowid: int, rising: Sequence[int]) -> bool:
+    """Return whether a rowid is among others, which rise."""
+    place = bisect_left(rising, rowid)
+    return place < len(rising) and rising[place] == rowid
 
 
 def _parsed_row(
