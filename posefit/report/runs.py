@@ -20,6 +20,8 @@ from posefit.settings import setting_text
 from posefit.sweep.cell import cell_from, other_version
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from posefit.arrays import Array
     from posefit.sweep.ledger import Ledger
 
@@ -198,7 +200,7 @@ def runs_of(
     )
 
 
-def _ranks(values: "Array", order: Sequence[int]) -> "Array":
+def _ranks(values: "NDArray[np.int64]", order: Sequence[int]) -> "Array":
     """Return the places of values (n,) in an order of all that occur."""
     rank = np.zeros(max(order, default=-1) + 1, dtype=np.int64)
     rank[order] = np.arange(len(order))

@@ -13,16 +13,20 @@ from posefit.statistics.profiles import Trace
 Item = TypeVar("Item")
 
 
-class Store(Protocol):
+class Stored(Protocol):
+    """Values that are made when they are asked for. A sequence is one, too."""
+
+    def __getitem__(self, k: int, /) -> Any: ...
+
+    def __len__(self) -> int: ...
+
+
+class Store(Stored, Protocol):
     """Values in the order in which they are added. A list is one, too."""
 
     def append(self, value: Any, /) -> None:
         """Add a value."""
         ...
-
-    def __getitem__(self, k: int, /) -> Any: ...
-
-    def __len__(self) -> int: ...
 
 
 class Packed:
@@ -74,7 +78,7 @@ class Traces:
 class Ordered(Sequence[Item], Generic[Item]):
     """Some values of a store in another order, which are not copied."""
 
-    def __init__(self, store: Store, order: NDArray[np.int64]) -> None:
+    def __init__(self, store: Stored, order: NDArray[np.int64]) -> None:
         """Choose values.
 
         Args:
