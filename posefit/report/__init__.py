@@ -15,6 +15,7 @@ r"""The report of a ledger: a page for any browser, figures for papers, and tabl
 | the steps of the command, and its checks | write.py |
 | the table of runs, and the contest of the methods that share some | contest.py |
 | reading the rows of a ledger into that table | runs.py |
+| what a row has besides figures, for a million rows | stored.py |
 | tracks, with the error with losses | tracks.py |
 | single searches | searches.py |
 | figures and the score: names, digits, averages, texts | columns.py |
