@@ -2,6 +2,8 @@
 
 from pluggy import HookimplMarker
 
+from posefit.comparison import Comparison as Comparison
+from posefit.comparison import compare as compare
 from posefit.fitting.box import Space as Space
 from posefit.fitting.box import Start as Start
 from posefit.fitting.cost import SilhouetteCost as SilhouetteCost
@@ -36,8 +38,6 @@ from posefit.motion.clips import load_motion as load_motion
 from posefit.motion.motion import Motion as Motion
 from posefit.registry import optimiser as optimiser
 from posefit.registry import prior as prior
-from posefit.report.comparison import Comparison as Comparison
-from posefit.report.comparison import compare as compare
 from posefit.silhouette.cost import areas as areas
 from posefit.silhouette.cost import mismatch as mismatch
 from posefit.silhouette.cost import pose_costs as pose_costs

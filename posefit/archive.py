@@ -112,11 +112,12 @@ def archived(
         names: the arrays to look for; others are ignored.
         what: description of the expected arrays, for messages.
         packed: most bytes that the file may have.
-        single: if the file has only one array, take it for the first of the names.
+        single: if the file has only one array, take it for the first of the names,
+            which is needed.
 
     Raises:
-        InputError: the file is damaged or too large. It may also be raised when an
-            array is unpacked.
+        InputError: the file is damaged or too large, or has several arrays and none of
+            the first name. It may also be raised when an array is unpacked.
     """
     check_size(path, packed)
     with ExitStack() as stack:
@@ -136,6 +137,12 @@ def archived(
             ):
                 only = only.removesuffix(".npy")
                 arrays = {names[0]: _stored(path, what, archive, only)}
+        if single and names[0] not in arrays:
+            keys = sorted(member.removesuffix(".npy") for member in members)
+            raise InputError(
+                f"{path}: expected an .npz file with {what}, got "
+                f"{cut(', '.join(map(quoted, keys))) or 'none'}"
+            )
         yield arrays
 
 

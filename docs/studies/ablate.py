@@ -50,6 +50,7 @@ from posefit.arrays import Array
 from posefit.cli.output import Command
 from posefit.errors import InputError
 from posefit.footage.scene import Scene
+from posefit.geometry.skeleton import ANGLES
 from posefit.settings import settings_of
 from posefit.statistics.means import mean_interval
 from posefit.sweep.cell import cell_scene
@@ -80,18 +81,13 @@ AS_IT_IS = "as it is"
 # Constants that are not halved and doubled, by the reason.
 FIXED: Mapping[str, Sequence[str]] = {
     "they follow from other constants": (
-        "CONTINUED_EVALUATIONS",
-        "FRESH_EVALUATIONS",
-        "LIMB_EVALUATIONS",
         "MIN_EVALUATIONS",
-        "MIN_FIT_EVALUATIONS",
-        "YAW_STEP",
+        "YAWS",
     ),
     "they lay out arrays, and change rounding at most": (
         "ANGLES",
         "FIRST_DIMENSIONS",
         "LANES",
-        "TOTAL_BINS",
     ),
     "they keep numbers finite": ("MAX_KERNEL_COST",),
     "they name a stream of random numbers": ("RNG_STREAM_TABLE",),
@@ -102,11 +98,11 @@ FIXED: Mapping[str, Sequence[str]] = {
         "ELEVATION",
         "FIELD_OF_VIEW",
         "GROUPS",
-        "MIN_FRAME_DISTANCE",
         "PICTURE",
         "POSES",
+        "MIN_FRAME_DISTANCE",
+        "SAME_TURN",
         "SIDE",
-        "YAWS",
     ),
     "they change the posterior, not the pose: see posterior.py": (
         "MODE_DISTANCE",
@@ -130,14 +126,20 @@ OFF = 1e9  # of a spread or a cost: so large that what depends on it says nothin
 TINY = 1e-9  # of a share or a cost
 FRAMES = 24  # of a clip, at most
 
-Change = Mapping[str, Any]  # the constants that differ, by `module.NAME`
-# A mechanism is switched off by the constant that gives it its weight.
+
+def no_pull(_noise: float) -> Array:
+    """Return no weight (69,) for the poses of clips."""
+    return np.zeros(3 + ANGLES)
+
+
+# the constants and functions that differ, by `module.NAME`
+Change = Mapping[str, Any]
+# A mechanism is switched off by the constant or function that gives it its weight.
 MECHANISMS: Mapping[str, Change] = {
     AS_IT_IS: {},
-    "no reflected hypotheses": {"proposals.REFLECTED_SHARE": 0.0},
-    "no fresh hypotheses but two": {"proposals.FRESH_SHARE": TINY},
-    "all hypotheses fresh but one": {"proposals.FRESH_SHARE": 0.9},
-    "poses of clips pull no hypothesis": {"fits.LIBRARY_TURN": OFF},
+    "no reflected hypotheses": {"proposals.reflected_count": lambda _fresh: 0},
+    "no fresh hypotheses but two": {"proposals.fresh_count": lambda _evaluations: 2},
+    "poses of clips pull no hypothesis": {"fits.library_precisions": no_pull},
     "distance from clips costs nothing": {"cost_model.LIBRARY_COST": 0.0},
     "no diverse states": {"beam.BEAM_SHARES": 1},
     "masks are never taken for noisy": {"cost_model.CLEAN_COST": OFF},
@@ -148,7 +150,7 @@ MECHANISMS: Mapping[str, Change] = {
     },
     "no search everywhere after the first frame": {"path.SEARCHES_PER_SECOND": TINY},
     "no jumps": {"cost_model.JUMP_COST": 1e4},
-    "near hypotheses are not one": {"hypotheses.SAME_DISTANCE": 1e-4},
+    "near hypotheses are not one": {"hypotheses.same_distance": lambda _cameras: 1e-4},
     "the beam has all evaluations but a fit": {"tracker.FIT_SHARE": 0.3},
     "the path's costs count as much": {"cost_model.SHARPNESS": 1.0},
     "no smoothing over time": {"smoothing.FILTER_REACH": 0.0},

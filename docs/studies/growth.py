@@ -207,7 +207,8 @@ def plan_of(cells: int) -> Any:
 
 def plan_cells(cells: int, folder: Path) -> None:
     """Plan a sweep, and write its cells to a ledger."""
-    from posefit.sweep.ledger import FILE, Writer
+    from posefit.sweep.schema import FILE
+    from posefit.sweep.writer import Writer
 
     with Writer(folder / "ledger" / FILE) as ledger:
         ledger.plan(plan_of(cells))

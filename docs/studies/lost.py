@@ -232,7 +232,7 @@ SIDES_SIGNS = (
         for name in ("cost", "reflected", "mirrored", "second")
         for mean in ("", ", in general")
     ),
-    *("farthest, in general", "across", "ahead", "speed", "views"),
+    *("farthest, in general", "across", "views"),
 )
 
 

@@ -20,7 +20,7 @@ from posefit_envs.base import (
     row_of,
 )
 from posefit_envs.rendering import Picture, render_frame
-from posefit_envs.stage import Rows, Stage, first_scene
+from posefit_envs.stage import Rows, Stage, first_scene, first_scenes
 from posefit_envs.world import (
     FirstFrame,
     Image,
@@ -206,12 +206,15 @@ class FitImageVectorEnv(SearchVectorEnv):
 
     def begin(self, rows: Rows) -> None:
         """Begin episodes in some environments, with the instances of `numbers`."""
-        for i in rows.tolist():
-            number = int(self.numbers[i])
-            self.stage.set_scene(i, first_scene(self.world, number))
+        numbers = self.numbers[rows]
+        for i, number in zip(rows.tolist(), numbers.tolist(), strict=True):
             self._problems.begin(i, partial(first_problem, self.world, number))
             if self.world.shows_truth:
+                # a scene and its truth are made of one instance, which is not cached
+                # for long
+                first_scene(self.world, number)
                 self._truths[i] = first_truth(self.world, number)
+        self.stage.set_scenes(rows, first_scenes(self.world, numbers))
 
     def observe(self, rows: Rows) -> Image:
         """Return the pictures of some environments as they are now."""

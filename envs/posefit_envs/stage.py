@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from posefit import SearchSpace, SilhouetteCost
 from posefit.arrays import Array, Bits
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS
-from posefit.motion.instances import TRAINING
 from posefit.silhouette.cost import mean_over_views, mismatch
 from posefit.silhouette.drawn import count_poses, uncounted
 from posefit.silhouette.mask import pack
@@ -20,6 +19,7 @@ from posefit_envs.kernels import Scenes, align_scenes, draw_scenes, unpack_scene
 from posefit_envs.world import (
     BODY,
     OBSERVED,
+    SPLITS,
     Image,
     World,
     body_of,
@@ -31,6 +31,8 @@ Rows = NDArray[np.int64]
 _BODY = np.uint16(BODY)
 # largest scene, in pixels, that is cached; it takes about 5 kB
 LARGEST_REMEMBERED = 2 * 64 * 64
+# worlds whose scenes are cached, such as those of training and of a test
+REMEMBERED_WORLDS = 4
 
 
 class SceneRow(NamedTuple):
@@ -79,12 +81,86 @@ class SceneRow(NamedTuple):
         )
 
 
+def empty_columns(world: World, rows: int) -> SceneRow:
+    """Return uninitialised columns for the scenes of a world, with that many rows."""
+    width, height = world.size
+    views = len(world.view_degrees)
+    bits = pack(np.zeros((height, width), dtype=bool)).shape
+    d = world.dimensions
+    return SceneRow(
+        centre=np.empty((rows, d)),
+        half=np.empty((rows, d)),
+        anchor=np.empty((rows, 3)),
+        offsets=np.empty((rows, len(BONES), 3)),
+        radii=np.empty((rows, len(BONES), 2)),
+        rotations=np.empty((rows, views, 3, 3)),
+        places=np.empty((rows, views, 3)),
+        focals=np.empty((rows, views, 2)),
+        centres=np.empty((rows, views, 2)),
+        observed=np.empty((rows, views, *bits), dtype=np.uint64),
+        valid=np.empty((rows, views, *bits), dtype=np.uint64),
+        totals=np.empty((rows, views), dtype=np.int64),
+        joint_radii=np.empty((rows, len(JOINTS))),
+        borders=np.empty((rows, views, 4)),
+        truth=np.empty((rows, ANGLES)),
+        masks=np.empty((rows, height, (width + 7) // 8, views), dtype=np.uint8),
+    )
+
+
+@final
+class FirstScenes:
+    """The scenes of the first frames of a split's instances, made when first used."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._split = SPLITS[world.split]
+        # memory is taken row by row, as scenes are written
+        self._columns = empty_columns(world, len(self._split))
+        self._made = np.zeros(len(self._split), dtype=bool)
+
+    def scene(self, number: int) -> SceneRow:
+        """Return the scene of an instance."""
+        row = number - self._split.start
+        self._make(row)
+        return _read(self._columns, row)
+
+    def scenes(self, numbers: Rows) -> SceneRow:
+        """Return the scenes of instances as columns, a row for each number (m,)."""
+        rows = numbers - self._split.start
+        for row in rows[~self._made[rows]].tolist():
+            self._make(row)
+        return _read(self._columns, rows)
+
+    def _make(self, row: int) -> None:
+        if not self._made[row]:
+            scene = _made_scene(self._world, row + self._split.start)
+            _write(self._columns, row, scene)
+            self._made[row] = True
+
+
+_first_scenes = lru_cache(maxsize=REMEMBERED_WORLDS)(FirstScenes)
+
+
 def first_scene(world: World, number: int) -> SceneRow:
     """Return the scene of an instance's first frame. Small scenes are cached."""
+    if _is_small(world):
+        return _first_scenes(world.default_infos).scene(number)
+    return _made_scene(world, number)
+
+
+def first_scenes(world: World, numbers: Rows) -> SceneRow:
+    """Return the scenes of instances (m,) as columns of m rows. See `first_scene`."""
+    if _is_small(world):
+        return _first_scenes(world.default_infos).scenes(numbers)
+    columns = empty_columns(world, len(numbers))
+    for row, number in enumerate(numbers.tolist()):
+        _write(columns, row, _made_scene(world, number))
+    return columns
+
+
+def _is_small(world: World) -> bool:
     width, height = world.size
-    if width * height * len(world.view_degrees) > LARGEST_REMEMBERED:
-        return _made_scene(world, number)
-    return _remembered_scene(world, number)
+    return width * height * len(world.view_degrees) <= LARGEST_REMEMBERED
 
 
 def _made_scene(world: World, number: int) -> SceneRow:
@@ -92,7 +168,17 @@ def _made_scene(world: World, number: int) -> SceneRow:
     return SceneRow.of(made.cost(0, first_space(world, made)), made.truth.poses[0])
 
 
-_remembered_scene = lru_cache(maxsize=len(TRAINING))(_made_scene)
+def _read(columns: SceneRow, rows: int | Rows) -> SceneRow:
+    """Return a scene of columns, or columns of m scenes."""
+    arrays: Sequence[Any] = columns
+    return SceneRow(*[column[rows] for column in arrays])
+
+
+def _write(columns: SceneRow, rows: int | Rows, scenes: SceneRow) -> None:
+    """Write a scene to a row of columns, or columns of m scenes to m rows."""
+    arrays: Sequence[NDArray[Any]] = columns
+    for column, values in zip(arrays, scenes, strict=True):
+        column[rows] = values
 
 
 class Drawn(NamedTuple):
@@ -118,32 +204,13 @@ class Stage:
     def __init__(self, world: World, rows: int, threads: int = 1) -> None:
         width, height = world.size
         views = len(world.view_degrees)
-        bits = pack(np.zeros((height, width), dtype=bool)).shape
-        d = world.dimensions
         self.threads = threads
         self.all_rows: Rows = np.arange(rows)
         self._width = width
         self._prior = world.learned
         self._translation = world.translation
         self._chain = body_of(world.motion[0]).skeleton.chain
-        self._columns = SceneRow(
-            centre=np.empty((rows, d)),
-            half=np.empty((rows, d)),
-            anchor=np.empty((rows, 3)),
-            offsets=np.empty((rows, len(BONES), 3)),
-            radii=np.empty((rows, len(BONES), 2)),
-            rotations=np.empty((rows, views, 3, 3)),
-            places=np.empty((rows, views, 3)),
-            focals=np.empty((rows, views, 2)),
-            centres=np.empty((rows, views, 2)),
-            observed=np.empty((rows, views, *bits), dtype=np.uint64),
-            valid=np.empty((rows, views, *bits), dtype=np.uint64),
-            totals=np.empty((rows, views), dtype=np.int64),
-            joint_radii=np.empty((rows, len(JOINTS))),
-            borders=np.empty((rows, views, 4)),
-            truth=np.empty((rows, ANGLES)),
-            masks=np.empty((rows, height, (width + 7) // 8, views), dtype=np.uint8),
-        )
+        self._columns = empty_columns(world, rows)
         # the bodies that were rasterised last, and which rows have one
         self._poses = np.zeros((rows, ANGLES))
         self._translations = np.zeros((rows, 3))
@@ -166,12 +233,17 @@ class Stage:
 
     def set_scene(self, row: int, scene: SceneRow) -> None:
         """Set a row's scene, without a body."""
-        self._has_body[row] = False
-        columns: Sequence[NDArray[Any]] = self._columns
-        for column, value in zip(columns, scene, strict=True):
-            column[row] = value
-        pixels = np.unpackbits(scene.masks, axis=1, count=self._width)
-        np.multiply(pixels, OBSERVED, out=self._backdrops[row], dtype=np.uint16)
+        self._set(row, scene, axis=1)
+
+    def set_scenes(self, rows: Rows, scenes: SceneRow) -> None:
+        """Set the scenes of rows (m,), without bodies; `scenes` are columns of them."""
+        self._set(rows, scenes, axis=2)
+
+    def _set(self, rows: int | Rows, scenes: SceneRow, axis: int) -> None:
+        self._has_body[rows] = False
+        _write(self._columns, rows, scenes)
+        pixels = np.unpackbits(scenes.masks, axis=axis, count=self._width)
+        self._backdrops[rows] = np.multiply(pixels, OBSERVED, dtype=np.uint16)
 
     def space(self, row: int) -> SearchSpace:
         """Return the box of a row's proposals."""

@@ -103,6 +103,11 @@ class World:
         return self.errors and (self.evaluate or self.split == "train")
 
     @cached_property
+    def default_infos(self) -> "World":
+        """The same world with the default infos, on which no scene depends."""
+        return replace(self, errors=True, evaluate=False)
+
+    @cached_property
     def learned(self) -> Prior:
         """The prior, fitted to the training motions."""
         return _learned(self.prior, self.motion[0], self.training)

@@ -65,4 +65,6 @@ def joined(*beams: Beam) -> Beam:
 
 def yaw_bins(yaws: Array) -> Rows:
     """Return the bin of each yaw."""
-    return np.round(yaws * (YAW_BINS / (2.0 * np.pi))).astype(np.int64) % YAW_BINS
+    turns = yaws * (YAW_BINS / (2.0 * np.pi))
+    bins: Rows = np.round(turns).astype(np.int64) % YAW_BINS
+    return bins

@@ -22,9 +22,7 @@ from posefit.uncertainty.modes import Posterior
 from posefit_exemplars.estimate import Estimate
 from posefit_exemplars.frame_costs import FrameCosts
 
-# Below these the logarithms of cost and spread no longer fall.
-MIN_COST = 0.1  # per cent
-MIN_SPREAD = 0.002  # metres
+MIN_SPREAD = 0.002  # metres: the logarithm of a spread falls no further
 
 
 def evidence(
@@ -51,7 +49,7 @@ def evidence(
     return np.array(
         [
             1.0,
-            math.log(max(cost, MIN_COST)),
+            math.log(max(cost, np.finfo(np.float64).tiny)),
             math.log(max(spread, MIN_SPREAD)),
             float(cameras > 1),
         ]

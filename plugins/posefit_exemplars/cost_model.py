@@ -6,11 +6,12 @@ hypotheses. Both are cheapest paths, with these costs:
 
 | stage | a pose in a frame | a step to the next frame |
 |---|---|---|
-| path | its silhouette, landmarks and `yaw_costs` | `ClipSteps.costs` |
+| path | `ClipCosts.of_poses`, `ClipCosts.of_small` | `ClipSteps.costs` |
 | hypotheses | `HypothesisCosts.of_poses`, landmarks | `HypothesisCosts.of_steps` |
 
-`frame_costs` compares poses with silhouettes and landmarks. docs/studies/ablate.py
-measures the effect of each cost.
+`frame_costs` compares poses with silhouettes and landmarks, and `proposals` reaches new
+states at the prices of `ClipSteps`. docs/studies/ablate.py measures the effect of each
+cost.
 """
 
 import math
@@ -21,6 +22,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.fitting.landmarks import landmark_costs
 from posefit.fitting.tracker import Task
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import JOINTS
@@ -112,6 +114,15 @@ class ClipSteps:
         places = beam.places + about_vertical(displacements, beam.yaws)
         return cls(beam, step, codes, beam.yaws + turns, places)
 
+    @property
+    def pose_cost(self) -> float:
+        """The cost of a pose for each square metre of its squared distance."""
+        return 1.0 / (2.0 * self.step.pose**2)
+
+    def turn_costs(self, turns: Array) -> Array:
+        """Return the costs of turns away from the clips, in radians."""
+        return np.asarray(0.5 * (turns / self.step.turn) ** 2)
+
     def costs(
         self,
         exemplars: Exemplars,
@@ -139,13 +150,13 @@ class ClipSteps:
         codes = exemplars.codes[after.states]
         squares = squared_distances(self.codes, codes)
         # TOYAMA2001 (dynamics)
-        pose_costs = squares / np.float32(2.0 * step.pose**2)
+        pose_costs = squares * np.float32(self.pose_cost)
         # Most steps cost more than a jump by their poses alone, and need no more. Flat
         # indices of the others take a tenth of the time of a mask.
         near = np.flatnonzero(pose_costs < JUMP_COST)
         rows, columns = np.divmod(near, len(after))
         turns = wrapped(after.yaws[columns] - self.yaws[rows])
-        cheap = pose_costs.take(near) + 0.5 * (turns / step.turn) ** 2
+        cheap = pose_costs.take(near) + self.turn_costs(turns)
         if aligned:
             missed = after.places.take(columns, 0) - self.places.take(rows, 0)
             sights = lines_of_sight(after.places, camera)
@@ -158,6 +169,18 @@ class ClipSteps:
             turned = np.abs(wrapped(after.yaws - self.beam.yaws[:, None]))
             costs += FAST_TURN_COST * np.maximum(turned - step.max_turn, 0.0)
         return costs
+
+
+def root_costs(places: Array, expected: Array, camera: Array | None) -> Array:
+    """Return the costs (..., n) of aligned roots at `places` (n, 3).
+
+    Args:
+        places: (n, 3) metres.
+        expected: (..., n, 3) metres, where they were expected.
+        camera: (3,) metres, the position of the only camera, or None for several.
+
+    """
+    return root_deviation_costs(places - expected, lines_of_sight(places, camera))
 
 
 def lines_of_sight(places: Array, camera: Array | None) -> Array | None:
@@ -197,6 +220,39 @@ def root_deviation_costs(missed: Array, sights: Array | None) -> Array:
     )
 
 
+class ClipCosts:
+    """The costs of states of clips in a frame.
+
+    Args:
+        task: The task, for the time between frames.
+        temperature: Divides silhouette costs, for a thirtieth of a second.
+
+    """
+
+    def __init__(self, task: Task, temperature: float) -> None:
+        # at higher frame rates each frame counts for less, as it covers less time
+        self._weight = 30.0 / task.fps
+        self._temperature = temperature
+
+    def of_poses(self, frame_costs: FrameCosts, poses: Array, places: Array) -> Array:
+        """Return the costs (n,) of poses (n, 66) at places (n, 3)."""
+        return np.asarray(
+            self._of(frame_costs, poses, frame_costs.full(poses, places))
+            + landmark_costs(frame_costs.landmarks(poses, places))
+        )
+
+    def of_small(self, frame_costs: FrameCosts, poses: Array, places: Array) -> Array:
+        """Return rough costs (n,), by small pictures and without landmarks."""
+        return self._of(frame_costs, poses, frame_costs.small(poses, places))
+
+    def _of(self, frame_costs: FrameCosts, poses: Array, silhouettes: Array) -> Array:
+        """Return the costs (n,) of poses by their yaws and their silhouettes (n,)."""
+        costs = (
+            yaw_costs(poses[:, 0], frame_costs.yaw) + silhouettes / self._temperature
+        )
+        return np.asarray(self._weight * costs)
+
+
 def yaw_costs(yaws: Array, known: float | None) -> Array:
     """Return the costs (n,) of yaws (n,) in a frame with a yaw of about `known`.
 
@@ -212,20 +268,20 @@ class HypothesisCosts:
     """The costs of fitted hypotheses, and of the steps between them.
 
     Args:
+        task: The task, for the time between frames.
         exemplars: The poses of clips.
-        fps: Frames a second.
-        temperature: Divides silhouette costs on the path.
+        temperature: Divides silhouette costs on the path, for a thirtieth of a second.
         spread: Metres, the usual difference from where a pose leads on the path.
 
     """
 
     def __init__(
-        self, exemplars: Exemplars, fps: float, temperature: float, spread: float
+        self, task: Task, exemplars: Exemplars, temperature: float, spread: float
     ) -> None:
         self._exemplars = exemplars
+        self._weight = 30.0 / task.fps
         self._temperature = temperature / SHARPNESS
         self._spread = STEP_SPREAD * spread
-        self._library_cost = LIBRARY_COST * 30.0 / fps
 
     def of_poses(
         self, frame_costs: FrameCosts, poses: Array, places: Array, noise: float
@@ -248,11 +304,11 @@ class HypothesisCosts:
         # view counts as much as the clips do
         first_pass = frame_costs.observation.estimate is None
         views = 1 if first_pass else frame_costs.camera_count
+        library_cost = ALONE_LIBRARY_COST if frame_costs.alone else LIBRARY_COST
         distances = np.log1p(0.5 * squares / LIBRARY_DISTANCE**2)
-        library_cost = ALONE_LIBRARY_COST if frame_costs.alone else self._library_cost
-        scaled_costs = silhouette_costs / (noise * self._temperature)
-        costs = np.asarray(scaled_costs + library_cost / views * distances)
-        return costs, float(silhouette_costs.min())
+        costs = silhouette_costs / (noise * self._temperature)
+        costs += library_cost / views * distances
+        return self._weight * costs, float(silhouette_costs.min())
 
     def of_steps(
         self,
@@ -267,9 +323,8 @@ class HypothesisCosts:
         """
         costs = motion_step_costs(self._spread, before, after)
         if frame_costs.root is None:
-            expected = before.places + before.shifts
-            sights = lines_of_sight(after.places, frame_costs.camera_position)
-            costs += root_deviation_costs(after.places - expected[:, None], sights)
+            expected = (before.places + before.shifts)[:, None]
+            costs += root_costs(after.places, expected, frame_costs.camera_position)
         return costs
 
 
@@ -328,7 +383,7 @@ class MaskNoise:
         evaluations = 0.0
         if frame_costs.usable and not self._costs:
             least = float(frame_costs.full(poses, places).min())
-            self._costs.append(FITTED_COST_SHARE * least)
+            self.add(FITTED_COST_SHARE * least)
             evaluations = float(len(poses))
         typical = float(np.quantile(self._costs or [0.0], BEST_SHARE))
         return max(typical / CLEAN_COST, 1.0), evaluations

@@ -24,6 +24,8 @@ from posefit_exemplars.kernels import Codes, Rows
 
 # Metres: the least distance of two states of a clip, and of the centres of two groups.
 MIN_FRAME_DISTANCE = 0.02
+# Radians: directions that differ by less count as similar.
+SAME_TURN = np.radians(15.0)
 GROUPS = 1000  # groups of similar poses, at most
 COARSE_GROUPS = 40
 NEAR_GROUPS = 4  # groups that a search for the nearest poses looks into

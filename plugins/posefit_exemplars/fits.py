@@ -22,7 +22,7 @@ from posefit.fitting.contours import (
     precisions,
 )
 from posefit.fitting.tracker import Task
-from posefit_exemplars.exemplars import Exemplars
+from posefit_exemplars.exemplars import SAME_TURN, Exemplars
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import SAME_DISTANCE
 
@@ -31,22 +31,39 @@ FRESH_REACHES = ROBUST_SCALES[:8]
 # The first step of a hypothesis that continues reaches farther, because a limb may have
 # left the way that it had.
 CONTINUED_REACHES = (0.15, *FRESH_REACHES[1::2])
-# The last evaluation is the cost of the fitted pose.
-FRESH_EVALUATIONS = len(FRESH_REACHES) * STEP_EVALUATIONS + 1.0
-# Two of the evaluations compare the places to start at.
-CONTINUED_EVALUATIONS = len(CONTINUED_REACHES) * STEP_EVALUATIONS + 3.0
-# Standard deviations of an angle from the start of a fit, and from similar clips.
-START_TURN = np.radians(8.0)
-LIBRARY_TURN = np.radians(15.0)
+START_TURN = np.radians(8.0)  # standard deviation of an angle from the start of a fit
 # Standard deviations of the root from its start, metres.
 KNOWN_SHIFT = 0.003
 ALIGNED_SHIFT = 0.05
 # The mean of the nearest poses of clips pulls a hypothesis that continues. A pose gets
 # less weight the farther it is away, compared to the nearest one: `SAME_DISTANCE` is
-# the standard deviation.
+# the standard deviation, and `SAME_TURN` that of an angle from the mean.
 SIMILAR_POSES = 8
 
 PosesAndPlaces = tuple[Array, Array]  # (n, 66), and (n, 3) metres
+
+
+def fresh_evaluations() -> float:
+    """Return the evaluations of a fresh hypothesis: its fit, and the fitted cost."""
+    return len(FRESH_REACHES) * STEP_EVALUATIONS + 1.0
+
+
+def continued_evaluations() -> float:
+    """Return the evaluations of a hypothesis that continues.
+
+    They are its fit, the cost of the fitted pose, and those of both places to start at.
+    """
+    return len(CONTINUED_REACHES) * STEP_EVALUATIONS + 3.0
+
+
+def library_precisions(noise: float) -> Array:
+    """Return the precisions (69,) of the mean of similar poses of clips.
+
+    It says nothing of the place and of the yaw, and says more if masks are noisy.
+    """
+    pulls = precisions(SAME_TURN / noise, np.inf)
+    pulls[3] = 0.0
+    return pulls
 
 
 class FrameFits:
@@ -85,7 +102,7 @@ class FrameFits:
 
     def fresh(self, start: PosesAndPlaces) -> PosesAndPlaces:
         """Return poses fitted from a start that is only near the person's pose."""
-        self.evaluations += len(start[0]) * FRESH_EVALUATIONS
+        self.evaluations += len(start[0]) * fresh_evaluations()
         return fitted(
             self._task.body,
             self._contours,
@@ -117,7 +134,7 @@ class FrameFits:
     def continued(self, start: PosesAndPlaces) -> PosesAndPlaces:
         """Return poses fitted from where hypotheses of the frame before lead."""
         poses, places = start
-        self.evaluations += len(poses) * CONTINUED_EVALUATIONS
+        self.evaluations += len(poses) * continued_evaluations()
         places = self._cheaper_places(poses, places)
         means, pulls = self._pulls(poses)
         return fitted(
@@ -148,8 +165,8 @@ class FrameFits:
 
         They lie between the poses themselves and the mean of similar poses of clips.
         """
-        pulls = precisions(LIBRARY_TURN / self._noise, np.inf)
-        pulls[3] = 0.0  # the yaws of clips are free
+        pulls = library_precisions(self._noise)
         means = self._exemplars.nearby_mean(poses, SIMILAR_POSES, SAME_DISTANCE)
         sums = self._weights + pulls
-        return poses + (pulls / sums)[3:] * (means - poses), sums
+        shares = pulls[3:] / sums[3:]  # (66,)
+        return poses + shares * (means - poses), sums

@@ -14,14 +14,14 @@ from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
 from posefit.silhouette.cost import known_views, pose_costs
 from posefit.silhouette.mask import Areas, coarser_camera, coarser_silhouette
 
-MIN_SMALL_SIDE = 40  # pixels: no side of a small picture is shorter
+SIDE = 16  # pixels: a person is told apart in a picture with sides as long
 
 
 def small_factor(cameras: Sequence[Camera]) -> int:
     """Return how many pixels across and down become one in a small picture."""
     sides = [side for camera in cameras for side in (camera.width, camera.height)]
     for factor in (4, 2):
-        if min(sides) >= factor * MIN_SMALL_SIDE:
+        if min(sides) >= factor * SIDE:
             return factor
     return 1
 

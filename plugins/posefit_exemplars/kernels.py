@@ -16,7 +16,6 @@ DIMENSIONS = 24  # dimensions of a code; the remainder of the joints is below 5 
 # Dimensions that are compared first. They rule out most tiles.
 FIRST_DIMENSIONS = 6
 LANES = 32
-TOTAL_BINS = 256  # bins of the histogram of totals
 
 # (n, D): the distance of two codes is the distance of their poses' joints, rms, metres
 Codes = NDArray[np.float32]
@@ -132,9 +131,9 @@ class Bounds(NamedTuple):
 
 
 @inlined
-def bin_of(total, least, width):
-    """Return the bin of a total in a histogram from `least` in bins of a `width`."""
-    return min(int((total - least) / width), TOTAL_BINS - 1)
+def bin_of(total, least, width, count):
+    """Return the bin of a total in a histogram of `count` bins from `least`."""
+    return min(int((total - least) / width), count - 1)
 
 
 @inlined
@@ -174,8 +173,9 @@ def cheapest_steps(sources, rows, tiles, room, bounds):
     best, parents, reached = room
     distances = np.empty(LANES, np.float32)
     partial = np.empty(LANES, np.float32)
-    bins = np.zeros(TOTAL_BINS, np.int64)
-    width = (bounds.limit - bounds.least) / TOTAL_BINS
+    # as many bins as states in each, if the totals are evenly spread
+    bins = np.zeros(int(np.sqrt(bounds.wanted)) + 1, np.int64)
+    width = (bounds.limit - bounds.least) / len(bins)
     bound = bounds.limit
     count = 0
     for row in rows:
@@ -201,8 +201,10 @@ def cheapest_steps(sources, rows, tiles, room, bounds):
                         reached[count] = place
                         count += 1
                     else:
-                        bins[bin_of(best[place], bounds.least, width)] -= 1
-                    bins[bin_of(total, bounds.least, width)] += 1
+                        old = bin_of(best[place], bounds.least, width, len(bins))
+                        bins[old] -= 1
+                    new = bin_of(total, bounds.least, width, len(bins))
+                    bins[new] += 1
                     best[place] = total
                     parents[place] = row
         bound = bound_of(bins, bounds.least, width, bounds.wanted, bound)

@@ -10,6 +10,7 @@ After Brand, Shadow puppetry, 1999, and Li, Sun, Chen and Li's references 2 and 
 silhouette suggests a pose, and a search then makes it fit.
 """
 
+import math
 from functools import lru_cache
 from typing import NamedTuple, Self
 
@@ -29,19 +30,17 @@ from posefit.silhouette.cost import masks_of
 from posefit.silhouette.drawn import uncounted
 from posefit.silhouette.mask import Mask, Silhouette, box_of, without_small_pieces
 from posefit.uncertainty.modes import Posterior
-from posefit_exemplars.exemplars import Exemplars, exemplars_for
-from posefit_exemplars.frame_costs import FrameCosts
+from posefit_exemplars.exemplars import SAME_TURN, Exemplars, exemplars_for
+from posefit_exemplars.frame_costs import SIDE, FrameCosts
 from posefit_exemplars.kernels import Rows
 
 POSES = 2000  # poses in a table, drawn by `Exemplars.draw`
-YAWS = 24  # yaws that each pose is turned to
-YAW_STEP = 2.0 * np.pi / YAWS
+YAWS = round(math.tau / SAME_TURN)  # yaws that each pose is turned to
 # There is one table for each multiple of this elevation of the camera.
 ELEVATION = np.radians(10.0)
 DISTANCE = 4.3  # metres from the camera of a table to the person
 FIELD_OF_VIEW = 0.85  # radians, of that camera
 PICTURE = 64  # side of the camera's picture, pixels
-SIDE = 16  # side of the small picture that a code is made from, pixels
 DIMENSIONS = 64  # dimensions of a code
 CANDIDATES = 512  # poses, nearest in the table, that are compared by their costs
 COSTS_SHARE = 0.08  # share of a frame's evaluations that these costs take, at most
@@ -93,7 +92,7 @@ def _learned(exemplars: Exemplars, elevation: float) -> Arrays:
         states = np.unique(
             exemplars.draw(POSES, np.random.default_rng(RNG_STREAM_TABLE))
         )
-    yaws = np.tile(YAW_STEP * np.arange(YAWS), len(states))
+    yaws = np.tile(SAME_TURN * np.arange(YAWS), len(states))
     poses = exemplars.with_yaws(np.repeat(states, YAWS), yaws)
     camera = looking_at(0.0, elevation)
     small = list[Codes]()
@@ -231,11 +230,11 @@ class Lookup:
                     table = _table(self.exemplars, rounded)
                 views.append((table, azimuth))
                 # yaws in a table are relative to its camera, here to the first camera
-                turn = round((azimuth - views[0][1]) / YAW_STEP)
+                turn = round((azimuth - views[0][1]) / SAME_TURN)
                 total = total + np.roll(table.distances(picture), turn, axis=1)
         if not views:
             return None
-        yaws = wrapped(np.asarray(views[0][1] + YAW_STEP * np.arange(YAWS)))
+        yaws = wrapped(np.asarray(views[0][1] + SAME_TURN * np.arange(YAWS)))
         distances = total / len(views)
         if yaw is not None:
             distances[:, np.abs(wrapped(yaws - yaw)) > YAW_TOLERANCE] = np.inf

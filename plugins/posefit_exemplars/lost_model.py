@@ -2,15 +2,13 @@
 
 Two logistic models give them from the same evidence: the cost of the pose, the cost
 ratios of its mirrored and reflected poses, the spread of the sampled tracks, the share
-of them with sides exchanged, whether the person moves in the direction they face, the
-angle of view, and the number of cameras. The models also use the means of each value
-over a moment and over a second. A lost track stays lost for a while, and a sudden rise
-in cost counts more than a steady high cost.
+of them with sides exchanged, the angle of view, and the number of cameras. The models
+also use the means of each value over a moment and over a second. A lost track stays
+lost for a while, and a sudden rise in cost counts more than a steady high cost.
 """
 
 import json
 import math
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
@@ -28,8 +26,7 @@ from posefit.geometry.symmetry import facing
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import second_side
 
-# Decay time of the mean of the landmarks' evidence of sides, and the time over which
-# the root's motion is measured.
+# Decay time of the mean of the landmarks' evidence of sides.
 MOMENT_SECONDS = 0.5
 # Landmarks of one camera tell left from right if the mean logarithm of their odds is at
 # least this.
@@ -39,25 +36,20 @@ MEAN_SECONDS = {"lately": 0.2, "in general": 1.0}  # decay times of the means
 # The evidence of a frame. Each value enters the models on the scale given here.
 EVIDENCE: Mapping[str, Callable[[float], float]] = {
     # cost of the reported pose, if the person is visible
-    "cost": lambda value: math.log(max(value, 0.0) + 1.0),
-    # the least cost of poses reflected along a line of sight, over the cost
-    "reflected": math.log,
-    "mirrored": math.log,  # the cost of the mirror image, over the cost
+    "cost": math.log1p,
+    # how much more the cheapest pose costs that is reflected along a line of sight, on
+    # the same scale
+    "reflected": float,
+    "mirrored": float,  # how much more the mirror image costs, on the same scale
     # metres to the farthest sampled track
-    "farthest": lambda value: math.log(max(value, 0.0) + 0.01),
+    "farthest": lambda value: math.log(value + 0.01),
     "second": float,  # weight of the tracks that have left and right exchanged
-    "ahead": float,  # metres a second that the root moves in the direction it faces
-    "speed": float,  # metres a second that it moves in any direction
     # 0 to 1: facing across the only camera's line of sight; 0 with several cameras
     "across": float,
     # number of cameras that show something of the person, at most `MAX_VIEWS`
     "views": math.log2,
 }
-# Values used until there is a first one; other evidence starts at 0.
-DEFAULTS = {"reflected": 1.0, "mirrored": 1.0, "views": 1.0}
 MAX_VIEWS = 4  # the models were fitted with at most this many cameras
-MIRROR_COST_OFFSET = 1.0  # per cent, added to both costs of a ratio
-MAX_SPEED = 2.0  # metres a second; a higher speed is no better evidence
 # Names of the features: the evidence, then each of its means.
 NAMES = (
     *EVIDENCE,
@@ -93,42 +85,14 @@ def evidence_of(
         "views": float(min(len(visible), MAX_VIEWS)),
     }
     if frame.details["usable"]:
-        # the offset keeps ratios of small costs near 1
-        other_costs = frame.details["mirror_costs"] + MIRROR_COST_OFFSET
-        mirrored, *reflected = other_costs / (frame.cost + MIRROR_COST_OFFSET)
+        other_costs = np.log1p(frame.details["mirror_costs"])
+        mirrored, *reflected = other_costs - np.log1p(frame.cost)
         values |= {
             "cost": frame.cost,
             "reflected": float(min(reflected)),
             "mirrored": float(mirrored),
         }
     return values
-
-
-def root_motion(
-    places: Sequence[Array], yaw: float, fps: float, *, backwards: bool = False
-) -> dict[str, float]:
-    """Return the speed of the root `ahead`, where the person faces, and its `speed`.
-
-    Args:
-        places: (3,) metres, the latest places of the root.
-        yaw: The person's yaw, radians.
-        fps: Frames a second.
-        backwards: Whether the places are in reverse order of time.
-
-    Returns:
-        The two speeds in metres a second; nothing from fewer than two places.
-
-    """
-    if len(places) < 2:
-        return {}
-    displacement = (places[-1] - places[0])[[0, 2]]  # (2,) along the ground
-    velocity = displacement * fps / (len(places) - 1) * (-1.0 if backwards else 1.0)
-    ahead = float(velocity @ [math.sin(yaw), math.cos(yaw)])
-    speed = float(np.linalg.norm(velocity))
-    return {
-        "ahead": min(max(ahead, -MAX_SPEED), MAX_SPEED),
-        "speed": min(speed, MAX_SPEED),
-    }
 
 
 class EvidenceMeans:
@@ -145,14 +109,12 @@ class EvidenceMeans:
     def features(self, values: Mapping[str, float]) -> Array:
         """Return the features (3 E,) of the next frame: its evidence, and the means.
 
-        A missing value is copied from the frame before, in the first frame from
-        `DEFAULTS`.
+        A missing value is copied from the frame before. In the first frame its feature
+        is 0.
         """
-        self._latest |= values
-        scaled = []
-        for name, scale in EVIDENCE.items():
-            scaled.append(scale(self._latest.get(name, DEFAULTS.get(name, 0.0))))
-        now = np.array(scaled)
+        for name, value in values.items():
+            self._latest[name] = EVIDENCE[name](value)
+        now = np.array([self._latest.get(name, 0.0) for name in EVIDENCE])
         self._sums = self._sums * self._decays + now
         self._weight = self._weight * self._decays + 1.0
         return np.concatenate([now, (self._sums / self._weight).ravel()])
@@ -212,14 +174,9 @@ def with_failure_probabilities(
     means = EvidenceMeans(task.fps)
     side_sums = np.zeros(3)
     decay = math.exp(-1.0 / (MOMENT_SECONDS * task.fps))
-    places: deque[Array] = deque(maxlen=max(round(MOMENT_SECONDS * task.fps), 1) + 1)
     for frame in frames:
         assert frame.posterior is not None
-        places.append(frame.translation)
         evidence = evidence_of(task.body.skeleton, frame, task.cameras)
-        evidence |= root_motion(
-            places, float(frame.pose[0]), task.fps, backwards=task.backwards
-        )
         features = means.features(evidence)
         exchanged = classifier.sides.probability(features)
         # left and right are known unless the model or the landmarks say otherwise

@@ -24,8 +24,8 @@ from posefit_exemplars.kernels import Rows
 # belong to its mode.
 MODE_DISTANCE = 0.12
 # The cost of a step is at most this in the kernel. In single precision the likelihoods
-# of much costlier steps are 0, and if all were, their sum would be 0 too.
-MAX_KERNEL_COST = 80.0
+# of costlier steps may be 0, and if all were, their sum would be 0 too.
+MAX_KERNEL_COST = -np.log(np.finfo(np.float32).tiny)
 
 T = TypeVar("T")
 

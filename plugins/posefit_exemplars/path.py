@@ -32,11 +32,11 @@ from posefit.fitting.tracker import Observation, Task
 from posefit_exemplars import markov
 from posefit_exemplars.beam import Beam, diverse_best
 from posefit_exemplars.cost_model import (
+    ClipCosts,
     ClipSteps,
     HypothesisCosts,
     MaskNoise,
     Step,
-    yaw_costs,
 )
 from posefit_exemplars.estimate import Estimate
 from posefit_exemplars.exemplars import Exemplars
@@ -46,16 +46,14 @@ from posefit_exemplars.hypotheses import Hypotheses, same_distance
 from posefit_exemplars.kernels import Rows
 from posefit_exemplars.proposals import (
     BEAM_STATES,
-    LIMB_EVALUATIONS,
     HypothesisProposals,
     StateProposals,
+    limb_evaluations,
     next_states,
     poses_of,
 )
 
 FULL_SHARE = 0.6  # share of the path's evaluations for costs at full size
-# The path's evaluations per frame, at least, if several cameras leave less open.
-MIN_PATH_EVALUATIONS = 60.0
 SEARCHES_PER_SECOND = 10.0  # searches everywhere
 
 
@@ -74,7 +72,7 @@ class ClipPath:
     Args:
         task: The task.
         step: The time between frames, and the usual differences.
-        temperature: Divides silhouette costs.
+        costs: The costs of states.
         evaluations: The budget of each frame.
         delay: How many frames later a frame is estimated.
         lag: How many frames later the tracker reports it.
@@ -85,14 +83,14 @@ class ClipPath:
         self,
         task: Task,
         step: Step,
-        temperature: float,
+        costs: ClipCosts,
         evaluations: float,
         delay: int,
         lag: int,
     ) -> None:
         self._task = task
         self._step = step
-        self._temperature = temperature
+        self._costs = costs
         self._evaluations = evaluations
         self._delay = delay
         self._lag = lag
@@ -199,20 +197,13 @@ class ClipPath:
             The states, their costs (n,), and the evaluations used.
 
         """
-        turn_costs = yaw_costs(beam.yaws, frame_costs.yaw) * 30.0 / self._task.fps
         poses = poses_of(self.exemplars, beam)
-        small_costs = frame_costs.small(poses, beam.places)
-        totals = beam.totals + turn_costs + small_costs / self._temperature
+        rough = self._costs.of_small(frame_costs, poses, beam.places)
         used += len(beam)
-        rows = diverse_best(self.exemplars, beam, totals, full)
+        rows = diverse_best(self.exemplars, beam, beam.totals + rough, full)
         beam = beam.rows(rows)
         poses = poses[rows]
-        silhouette_costs = frame_costs.full(poses, beam.places) / self._temperature
-        costs = (
-            turn_costs[rows]
-            + silhouette_costs
-            + landmark_costs(frame_costs.landmarks(poses, beam.places))
-        )
+        costs = self._costs.of_poses(frame_costs, poses, beam.places)
         best = diverse_best(self.exemplars, beam, beam.totals + costs, BEAM_STATES)
         evaluations = used * frame_costs.small_share + len(beam)
         return beam.rows(best), costs[best], evaluations
@@ -222,10 +213,10 @@ class ClipPath:
         # for the reported pose, its mirror images, and a fraction of a small picture
         reserve = 3 + frame_costs.camera_count
         evaluations = self._evaluations
-        if not is_first:  # several cameras leave less open
-            evaluations = max(
-                evaluations / frame_costs.camera_count, MIN_PATH_EVALUATIONS
-            )
+        if not is_first:
+            # several cameras leave less open, but the beam must be filled
+            enough = min(evaluations, BEAM_STATES)
+            evaluations = max(evaluations / frame_costs.camera_count, enough)
         # at most as many states at full size as in small
         full = int(
             min(
@@ -391,7 +382,7 @@ class HypothesisPath:
                 continued = fits.continued(latest.continued(rows))
             evaluations = fits.evaluations
             if frame_costs.observation.estimate is not None:
-                evaluations += LIMB_EVALUATIONS
+                evaluations += limb_evaluations()
         poses, places = (
             np.concatenate(arrays) for arrays in zip(fresh, continued, strict=True)
         )

@@ -22,17 +22,20 @@ from posefit_exemplars.cost_model import (
     JUMP_COST,
     TURN_SPREAD,
     ClipSteps,
-    lines_of_sight,
-    root_deviation_costs,
+    root_costs,
     squared_distances,
 )
 from posefit_exemplars.estimate import Estimate
-from posefit_exemplars.exemplars import Exemplars
-from posefit_exemplars.fits import CONTINUED_EVALUATIONS, FRESH_EVALUATIONS
+from posefit_exemplars.exemplars import SAME_TURN, Exemplars
+from posefit_exemplars.fits import (
+    PosesAndPlaces,
+    continued_evaluations,
+    fresh_evaluations,
+)
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import Hypotheses, same_distance
 from posefit_exemplars.kernels import Rows
-from posefit_exemplars.lookup import YAW_STEP, YAW_TOLERANCE, Lookup
+from posefit_exemplars.lookup import YAW_TOLERANCE, Lookup
 
 BEAM_STATES = 200  # states that a frame keeps
 # Each candidate is also tried turned away from its clip, to either side, by so many
@@ -46,14 +49,21 @@ CONTINUED_SHARE = 0.25
 SIMILAR_SHARE = 0.25
 GROUP_POSES = 20
 
-# Evaluations per frame, at least: two fresh hypotheses and one that continues.
-MIN_FIT_EVALUATIONS = 2 * FRESH_EVALUATIONS + CONTINUED_EVALUATIONS
 FRESH_SHARE = 0.45  # share of the evaluations for fresh hypotheses
 REFLECTED_SHARE = 0.25  # share of reflections among the fresh hypotheses
 LIMB_POSES = 16  # poses of clips that lend their limbs, for each limb
 LIMB_ROUNDS = 2  # how often each limb is tried
 LIMB_ANGLES = [angles_of(bones) for bones in LIMBS.values()]
-LIMB_EVALUATIONS = LIMB_ROUNDS * len(LIMBS) * (LIMB_POSES + 1.0)
+
+
+def limb_evaluations() -> float:
+    """Return the evaluations of a search for the cheapest limbs of a pose."""
+    return LIMB_ROUNDS * len(LIMBS) * (LIMB_POSES + 1.0)
+
+
+def min_fit_evaluations() -> float:
+    """Return the least evaluations of fits: two fresh ones and one that continues."""
+    return 2.0 * fresh_evaluations() + continued_evaluations()
 
 
 def next_states(exemplars: Exemplars, steps: ClipSteps, count: int) -> Beam:
@@ -70,8 +80,7 @@ def next_states(exemplars: Exemplars, steps: ClipSteps, count: int) -> Beam:
         exemplars.near_groups(steps.codes),
     )
     least = beam.totals.min()
-    scale = 1.0 / (2.0 * steps.step.pose**2)
-    bounds = kernels.Bounds(scale, least, least + JUMP_COST, count)
+    bounds = kernels.Bounds(steps.pose_cost, least, least + JUMP_COST, count)
     places = len(exemplars.tiles.states)
     room = kernels.Room(
         np.full(places, np.inf),
@@ -91,11 +100,22 @@ def next_states(exemplars: Exemplars, steps: ClipSteps, count: int) -> Beam:
         np.tile(np.concatenate(parts), len(CANDIDATE_TURNS))
         for parts in zip(*by_bin, strict=True)
     )
-    turns = np.repeat(CANDIDATE_TURNS, len(states) // len(CANDIDATE_TURNS))
-    totals = totals + 0.5 * turns**2
-    yaws = steps.yaws[parents] + steps.step.turn * turns
+    spreads = np.repeat(CANDIDATE_TURNS, len(states) // len(CANDIDATE_TURNS))
+    turns = steps.step.turn * spreads
+    totals = totals + steps.turn_costs(turns)
+    yaws = steps.yaws[parents] + turns
     reached = Beam(states, yaws, totals, steps.places[parents])
     return reached.rows(diverse_best(exemplars, reached, totals, count))
+
+
+def fresh_count(evaluations: float) -> int:
+    """Return how many hypotheses of a frame are fresh: two at least."""
+    return max(int(FRESH_SHARE * evaluations / fresh_evaluations()), 2)
+
+
+def reflected_count(fresh: int) -> int:
+    """Return how many of the fresh hypotheses are reflections."""
+    return int(REFLECTED_SHARE * fresh)
 
 
 class StateProposals:
@@ -151,8 +171,7 @@ class StateProposals:
         expected = beam.places
         beam = self._placed(frame_costs, beam)
         if self._task.translation != "known":
-            sights = lines_of_sight(beam.places, frame_costs.camera_position)
-            costs = root_deviation_costs(beam.places - expected, sights)
+            costs = root_costs(beam.places, expected, frame_costs.camera_position)
             beam = replace(beam, totals=beam.totals + costs)
         return beam, used
 
@@ -181,7 +200,7 @@ class StateProposals:
         if nearest is not None:
             states = np.resize(nearest[0], tried)
             yaws = np.resize(nearest[1], tried)
-            yaws += YAW_STEP * rng.uniform(-0.5, 0.5, tried)
+            yaws += SAME_TURN * rng.uniform(-0.5, 0.5, tried)
         else:
             middle = 0.0 if known is None else known
             reach = np.pi if known is None else YAW_TOLERANCE
@@ -295,15 +314,16 @@ class HypothesisProposals:
         fresh hypotheses.
         """
         evaluations = self._evaluations / frame_costs.camera_count
-        evaluations = max(evaluations, MIN_FIT_EVALUATIONS)
+        evaluations = max(evaluations, min_fit_evaluations())
         if frame_costs.alone:
             fresh = race_count(evaluations)
             continued = 0
         else:
-            fresh = max(int(FRESH_SHARE * evaluations / FRESH_EVALUATIONS), 2)
-            rest = evaluations - fresh * FRESH_EVALUATIONS
-            continued = int(rest / CONTINUED_EVALUATIONS)
-        return Counts(fresh, fresh - 1 - int(REFLECTED_SHARE * fresh), continued)
+            fresh = fresh_count(evaluations)
+            rest = evaluations - fresh * fresh_evaluations()
+            continued = int(rest / continued_evaluations())
+        diverse = fresh - 1 - reflected_count(fresh)
+        return Counts(fresh, diverse, continued)
 
     def continuing(
         self, hypotheses: Hypotheses, totals: Array, frame_costs: FrameCosts
@@ -335,7 +355,7 @@ class HypothesisProposals:
         latest: Hypotheses,
         rows: Rows,
         rng: np.random.Generator,
-    ) -> tuple[Array, Array]:
+    ) -> PosesAndPlaces:
         """Return the poses (n, 66) and places (n, 3) that fresh hypotheses begin at.
 
         They are the path, diverse states, and reflections of the likeliest hypotheses.
@@ -355,26 +375,55 @@ class HypothesisProposals:
         places = np.concatenate([estimate.place[None], other_places])
         if not frame_costs.usable:
             return poses, places
-        tried = [(poses, places)]
-        likeliest = latest.continued(rows) if len(rows) else (poses, places)
-        count = self.counts(frame_costs).fresh - len(poses)  # of reflections
-        if count > 0:
-            # each pose has one reflection per camera
-            reflectable, place = (
-                array[: -(-count // frame_costs.camera_count)] for array in likeliest
-            )
-            reflected = frame_costs.reflected(reflectable, estimate.place)[:count]
-            tried.append((reflected, np.resize(place, (len(reflected), 3))))
+        starts = [(poses, places)]
+        likeliest = (poses, places)
+        if len(rows):
+            likeliest = latest.continued(rows)
+        reflections = self.counts(frame_costs).fresh - len(poses)
+        if reflections > 0:
+            starts.append(self._reflected(estimate, likeliest, reflections))
         if frame_costs.observation.estimate is not None:
-            pose, place = (array[None] for array in frame_costs.observation.estimate)
-            exchanged = [
-                exchanged_limbs(self._task.body.skeleton, pose, limbs)
-                for limbs in ("legs", "arms")
-            ]
-            tried += [(pose, place), *((other, place) for other in exchanged)]
-            tried.append(self._with_other_limbs(frame_costs, pose, place, rng))
-        poses, places = (np.concatenate(arrays) for arrays in zip(*tried, strict=True))
-        return poses, places
+            starts += self._from_earlier_track(
+                frame_costs, *frame_costs.observation.estimate, rng
+            )
+        all_poses, all_places = zip(*starts, strict=True)
+        return np.concatenate(all_poses), np.concatenate(all_places)
+
+    def _reflected(
+        self, estimate: Estimate, likeliest: PosesAndPlaces, count: int
+    ) -> PosesAndPlaces:
+        """Return `count` reflections of the likeliest poses, at their places.
+
+        There are fewer if there are too few poses. Each has a reflection per camera.
+        """
+        frame_costs = estimate.frame_costs
+        needed = -(-count // frame_costs.camera_count)
+        poses = likeliest[0][:needed]
+        places = likeliest[1][:needed]
+        reflected = frame_costs.reflected(poses, estimate.place)[:count]
+        return reflected, np.resize(places, (len(reflected), 3))
+
+    def _from_earlier_track(
+        self,
+        frame_costs: FrameCosts,
+        earlier_pose: Array,
+        earlier_place: Array,
+        rng: np.random.Generator,
+    ) -> list[PosesAndPlaces]:
+        """Return the pose (66,) that an earlier track reported, and variants of it.
+
+        It comes as it is, with exchanged legs, with exchanged arms, and with limbs of
+        clips.
+        """
+        pose = earlier_pose[None]
+        place = earlier_place[None]
+        skeleton = self._task.body.skeleton
+        return [
+            (pose, place),
+            (exchanged_limbs(skeleton, pose, "legs"), place),
+            (exchanged_limbs(skeleton, pose, "arms"), place),
+            self._with_other_limbs(frame_costs, pose, place, rng),
+        ]
 
     def _with_other_limbs(
         self,
@@ -382,7 +431,7 @@ class HypothesisProposals:
         pose: Array,
         place: Array,
         rng: np.random.Generator,
-    ) -> tuple[Array, Array]:
+    ) -> PosesAndPlaces:
         """Return a pose (1, 66) with the cheapest limbs, at its place (1, 3).
 
         Each limb is the cheapest of its own and those of a few random poses of clips.

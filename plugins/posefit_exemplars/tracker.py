@@ -10,16 +10,16 @@ from posefit.fitting.check import at_least, positive
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit_exemplars import markov
 from posefit_exemplars.calibration import reported
-from posefit_exemplars.cost_model import SHARPNESS, HypothesisCosts, Step
+from posefit_exemplars.cost_model import SHARPNESS, ClipCosts, HypothesisCosts, Step
 from posefit_exemplars.lost_model import stored_classifier, with_failure_probabilities
 from posefit_exemplars.path import ClipPath, HypothesisPath
-from posefit_exemplars.proposals import MIN_FIT_EVALUATIONS
+from posefit_exemplars.proposals import min_fit_evaluations
 from posefit_exemplars.smoothing import FILTER_REACH, smoothed
 
 # Fits take this share of the evaluations, and the path through the clips the rest.
 FIT_SHARE = 0.8
 # Evaluations per frame, at least: the hypotheses need their minimum.
-MIN_EVALUATIONS = math.ceil(MIN_FIT_EVALUATIONS / FIT_SHARE)
+MIN_EVALUATIONS = math.ceil(min_fit_evaluations() / FIT_SHARE)
 POSTERIOR_TEMPERATURE = 8.0  # divides silhouette costs in the posterior
 
 
@@ -58,8 +58,6 @@ class ExemplarTracker:
                 f" got {task.evaluations}"
             )
         step = Step.of(task, spread)
-        # at higher frame rates each frame counts for less, as it covers less time
-        temperature_per_frame = temperature / (30.0 / task.fps)
         fit_evaluations = FIT_SHARE * task.evaluations
         path_evaluations = task.evaluations - fit_evaluations
         # the smoothing uses some of the later frames, the hypotheses half of the
@@ -70,10 +68,15 @@ class ExemplarTracker:
         fits_ahead = (lag - self._ahead) // 2
         path_ahead = lag - self._ahead - fits_ahead
         self.clip_path = ClipPath(
-            task, step, temperature_per_frame, path_evaluations, path_ahead, lag
+            task,
+            step,
+            ClipCosts(task, temperature),
+            path_evaluations,
+            path_ahead,
+            lag,
         )
         exemplars = self.clip_path.exemplars
-        costs = HypothesisCosts(exemplars, task.fps, temperature_per_frame, step.pose)
+        costs = HypothesisCosts(task, exemplars, temperature, step.pose)
         power = temperature / POSTERIOR_TEMPERATURE / SHARPNESS
         sampling = markov.Sampling(samples, power)
         self.hypotheses = HypothesisPath(

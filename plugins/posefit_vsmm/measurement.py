@@ -49,6 +49,14 @@ class JointMeasurement(NamedTuple):
         )
 
 
+class ExpectedPoints(NamedTuple):
+    """Where a camera is expected to see the points of the body."""
+
+    pixels: Array  # (17, 2)
+    covariances: Array  # (17, 2, 2) square pixels
+    metre: float  # pixels per metre at the root's depth
+
+
 def with_sides(landmarks: Array, expected: Array) -> tuple[Array, Array]:
     """Return the points (17, 2) from landmarks, and their confidence (17,).
 
@@ -74,6 +82,27 @@ def with_sides(landmarks: Array, expected: Array) -> tuple[Array, Array]:
         if other < direct:
             placed[rows] = exchanged
     return placed[:, :2], np.where(single, np.minimum(placed[:, 2], 1.0), 0.0)
+
+
+def with_landmarks(
+    found: JointMeasurement, landmarks: Array, seen: ExpectedPoints
+) -> JointMeasurement:
+    """Return the means of the rules' points and of landmarks (27, 3).
+
+    The weights are inverse variances.
+    """
+    placed, trust = with_sides(landmarks, seen.pixels)
+    visible = found.confidence > 0.0
+    rules = visible[:, None] / found.variances
+    landmark_variance = (DEVIATION * seen.metre) ** 2
+    total = rules + np.maximum(trust, 1e-12)[:, None] / landmark_variance
+    placed = np.where(trust[:, None] > 0.0, placed, found.points)
+    return JointMeasurement(
+        placed + rules / total * (found.points - placed),
+        np.maximum(found.confidence, trust),
+        1.0 / total,
+        found.unassigned,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,45 +164,58 @@ class JointCameras:
         spread: Array,
         landmarks: Array | None,
     ) -> JointMeasurement:
-        pixels, jacobian = (part[0] for part in self.project(camera, expected[None]))
+        seen = self._expected_points(camera, expected, spread)
         if lines is None:
-            hidden = np.zeros(len(pixels))
-            return JointMeasurement(pixels, hidden, np.ones_like(pixels), 0)
+            hidden = np.zeros(len(seen.pixels))
+            return JointMeasurement(seen.pixels, hidden, np.ones_like(seen.pixels), 0)
+        found = self._found_by_rules(lines, seen)
+        if landmarks is not None and landmarks.any():
+            found = with_landmarks(found, landmarks, seen)
+        return self._gated(found, seen)
+
+    def _expected_points(
+        self, camera: Camera, expected: Array, spread: Array
+    ) -> ExpectedPoints:
+        """Return where a camera is expected to see the points of a state (43,)."""
+        pixels, jacobian = (part[0] for part in self.project(camera, expected[None]))
         depth = float((camera.rotation @ expected[:3] + camera.translation)[2])
-        # pixels per metre at the root's depth
         metre = float(camera.focal.mean()) / max(depth, MIN_DEPTH)
-        leg = leg_of(self.body.skeleton) * metre
         covariances = jacobian @ spread @ jacobian.swapaxes(1, 2)
-        largest = np.diagonal(covariances, axis1=1, axis2=2).max(axis=1)  # (17,)
-        gates = GATE_DEVIATIONS * np.sqrt(largest)
+        return ExpectedPoints(pixels, covariances, metre)
+
+    def _found_by_rules(self, lines: Lines, seen: ExpectedPoints) -> JointMeasurement:
+        """Return the joints that the rules find in a silhouette. VSMM 2."""
+        leg = leg_of(self.body.skeleton) * seen.metre
+        head = head_radius(self.body) * seen.metre
+        # each point is searched for within a gate around its expected position
+        largest = np.diagonal(seen.covariances, axis1=1, axis2=2).max(axis=1)  # (17,)
         low, high = self.rules.gate
-        gates = np.clip(gates, low * leg, high * leg)
-        head = head_radius(self.body) * metre
+        gates = np.clip(GATE_DEVIATIONS * np.sqrt(largest), low * leg, high * leg)
         points, confidence, unassigned = detect(
-            lines, pixels, gates, leg, head, self.rules
+            lines, seen.pixels, gates, leg, head, self.rules
         )
         variances = self.joint_noise * (self.rules.deviation * leg) ** 2
         # Interpretation V8
         trusted = np.maximum(confidence, self.rules.min_confidence)
-        variances = variances / trusted[:, None]
-        if landmarks is not None and landmarks.any():
-            placed, trust = with_sides(landmarks, pixels)
-            # weights are inverse variances
-            rules = (confidence > 0.0)[:, None] / variances
-            landmark_variance = (DEVIATION * metre) ** 2
-            total = rules + np.maximum(trust, 1e-12)[:, None] / landmark_variance
-            placed = np.where(trust[:, None] > 0.0, placed, points)
-            points = placed + rules / total * (points - placed)
-            variances = 1.0 / total
-            confidence = np.maximum(confidence, trust)
-        residuals = points - pixels
-        innovations = covariances + variances[:, :, None] * np.eye(2)
+        return JointMeasurement(
+            points, confidence, variances / trusted[:, None], unassigned
+        )
+
+    def _gated(self, found: JointMeasurement, seen: ExpectedPoints) -> JointMeasurement:
+        """Return the joints with those hidden that are too far from where expected.
+
+        The distance is Mahalanobis', squared. Such joints count as unassigned.
+        """
+        residuals = found.points - seen.pixels
+        innovations = seen.covariances + found.variances[:, :, None] * np.eye(2)
         solved = np.linalg.solve(innovations, residuals[..., None])[..., 0]  # (17, 2)
         distances = (residuals * solved).sum(axis=1)
-        rejected = (distances >= self.rules.max_distance) & (confidence > 0.0)
-        confidence = np.where(rejected, 0.0, confidence)
-        unassigned += int(np.count_nonzero(rejected))
-        return JointMeasurement(points, confidence, variances, unassigned)
+        visible = found.confidence > 0.0
+        rejected = (distances >= self.rules.max_distance) & visible
+        return found._replace(
+            confidence=np.where(rejected, 0.0, found.confidence),
+            unassigned=found.unassigned + int(np.count_nonzero(rejected)),
+        )
 
     def measure(
         self, states: Array, measured: Sequence[JointMeasurement], known: Array | None

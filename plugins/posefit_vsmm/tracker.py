@@ -12,6 +12,7 @@ from posefit.fitting import metrics
 from posefit.fitting.check import choices, positive
 from posefit.fitting.cost import align
 from posefit.fitting.tracker import Frame, Observation, Task
+from posefit.geometry.skeleton import ANGLES
 from posefit.silhouette.cost import known_views, pose_costs
 from posefit_vsmm.groups import TOPOLOGY, most_probable
 from posefit_vsmm.imm import Belief, Measurement
@@ -128,21 +129,13 @@ class TrackFilter:
             views = [lines_of(view.mask) for view in observation.silhouettes]
         blind = all(lines is None for lines in views)
         self._blind_frames = self._blind_frames + 1 if blind else 0
-        bad = self._bad_frames >= LOST_FRAMES
-        lost = bad or self._blind_frames > MAX_BLIND_FRAMES
-        if self._recovers and lost:
+        if self._recovers and self._lost():
             self._belief = None
-        # without a start: repeat the latest pose, or an upright one
-        if self._belief is None and blind:
-            pose = np.append(self._task.yaw or 0.0, np.zeros(65))
-            place = self._task.anchor
-            if self._latest is not None:
-                pose = self._latest.pose
-                place = self._latest.translation
-            return self._frame(pose, place, observation, {})
-        belief, measured, details = self._detected(
-            self._belief or self._start(observation), views, observation
-        )
+        if self._belief is None:
+            if blind:
+                return self._repeated(observation)
+            self._belief = self._start(observation)
+        belief, measured, details = self._detected(self._belief, views, observation)
         details["detection_seconds"] = time.perf_counter() - start
 
         def measure(states: Array) -> Measurement:
@@ -157,6 +150,21 @@ class TrackFilter:
         (pose,), (place,) = decode(state[None], self._dependent)
         self._evaluations += 1  # for the cost of the frame itself
         return self._frame(pose, place, observation, details)
+
+    def _lost(self) -> bool:
+        """Return whether the person was hidden, or the poses did not fit, too long."""
+        hidden = self._blind_frames > MAX_BLIND_FRAMES
+        return hidden or self._bad_frames >= LOST_FRAMES
+
+    def _repeated(self, observation: Observation) -> Frame:
+        """Return the latest pose again, or an upright one before the first."""
+        if self._latest is not None:
+            pose = self._latest.pose
+            place = self._latest.translation
+        else:
+            pose = np.append(self._task.yaw or 0.0, np.zeros(ANGLES - 1))
+            place = self._task.anchor
+        return self._frame(pose, place, observation, {})
 
     def _detected(
         self, belief: Belief, views: Sequence[Lines | None], observation: Observation

@@ -127,10 +127,10 @@ def report(
 
     A report may be written during a sweep. It then covers the finished cells.
     """
-    from posefit.report.write import leaderboard_lines, write_report
+    from posefit.report.write import write_report
 
-    summary = write_report(ledger, out, methods=_names(methods), **others)
-    print_result(leaderboard_lines(summary), summary, as_json)
+    report = write_report(ledger, out, methods=_names(methods), **others)
+    print_result(report.lines, report.data, as_json)
 
 
 def _names(texts: tuple[str, ...]) -> list[str]:
@@ -158,7 +158,7 @@ def rerun(ledger: str, key: str, out: str | None, as_json: bool) -> None:
     KEY is the row's key in the report, or its first digits.
     The exit status is 1 if a figure other than a time differs.
     """
-    from posefit.report import repeat
+    from posefit.sweep import repeat
 
     with results_alone() if as_json else nullcontext():
         differences = repeat.rerun(ledger, key, out)

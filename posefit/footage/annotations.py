@@ -12,7 +12,7 @@ belongs to the person if the middle of its column enters the polygon above its m
 """
 
 import json
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,7 @@ from posefit.footage.views import (
     View,
     check_some,
     empty_planes,
+    full_planes,
     known_planes,
     release,
     span,
@@ -81,13 +82,15 @@ def read_annotations(
     size = (first["width"], first["height"])
     check_decoded(str(path), len(files) * size[0] * size[1])
     bits = empty_planes(len(files), size)
-    there = np.zeros(len(files), dtype=bool)
+    there = np.array([file is not None for file in files])
+    known = known_planes(there, size)
     for k, file in enumerate(files):
         mask = np.zeros((size[1], size[0]), dtype=bool)
         if file is not None:
-            there[k] = True
-            for shape in content.shapes[images[str(file)]["id"]]:
-                mask |= content.mask(shape, size)
+            mask, crowd = content.masks(images[str(file)]["id"], size)
+            if (crowd & ~mask).any():
+                known = full_planes(len(files), size) if known is None else known
+                known[k] = np.packbits(mask | ~crowd)
         bits[k] = np.packbits(mask)
         release(bits, k)
     check_some(str(path), there, start)
@@ -97,10 +100,11 @@ def read_annotations(
         numbers=numbers,
         times=times_of(numbers, fps),
         bits=bits,
-        known=known_planes(there, size),
+        known=known,
         usable=there,
         size=size,
         fps=fps,
+        warnings=content.warnings,
         guesses=[*order.guesses, *content.guesses],
     )
 
@@ -111,7 +115,9 @@ class _Content:
     Attributes:
         images: The images by name, all of one size.
         shapes: The shapes of the people in each image, by its number in the file.
-        guesses: Which category is taken.
+            Each comes with whether it marks a crowd.
+        guesses: Which category is taken, and what crowds mean.
+        warnings: Which annotations belong to no image.
 
     """
 
@@ -133,23 +139,69 @@ class _Content:
             lists.append(value)
         images, annotations, categories = lists
         self.guesses = list[str]()
+        self.warnings = list[str]()
         chosen = self._category(categories, category)
         self.images = self._images(images)
-        self.shapes = defaultdict[Any, list[Any]](list)
+        self.shapes = defaultdict[Any, list[tuple[Any, bool]]](list)
         for each in annotations:
-            if each.get("category_id") == chosen:
-                self.shapes[_key(each.get("image_id"))].append(each.get("segmentation"))
+            if _key(each.get("category_id")) in chosen:
+                shape = each.get("segmentation"), each.get("iscrowd") in (1, True)
+                self.shapes[_key(each.get("image_id"))].append(shape)
         if not self.shapes:
             raise self._error("people with masks, got no annotation of the category")
+        self._check_images()
+        self._check_pixels()
+        if any(crowd for shapes in self.shapes.values() for _, crowd in shapes):
+            self.guesses.append(
+                f"{self._path}: what is marked iscrowd is unknown where an image has "
+                "other people, else a person"
+            )
+
+    def _check_images(self) -> None:
+        """Find people that are annotated in no image of the file.
+
+        Raises InputError if all of them are.
+        """
+        known = [image["id"] for image in self.images.values()]
+        listed = {*known}
+        others = [key for key in self.shapes if key not in listed]
+        if not others:
+            return
+        if len(others) == len(self.shapes):
+            raise self._error(
+                "annotations of its images, whose id is their image_id, got "
+                f"{quoted(others[0])} where images have {quoted(known[0])}"
+            )
+        self.warnings.append(
+            f"{self._path}: {len(others)} of {len(self.shapes)} annotated images, "
+            f"such as {quoted(others[0])}, are not in its list of images"
+        )
+
+    def _check_pixels(self) -> None:
+        """Raise InputError if all corners are shares of the picture, not pixels."""
+        largest = 0.0
+        for shapes in self.shapes.values():
+            for shape, _ in shapes:
+                for corners in shape if isinstance(shape, list) else [[np.inf]]:
+                    largest = max(largest, _largest(corners))
+                if largest > 1.0:
+                    return
+        if largest > 0.0:
+            raise self._error(
+                f"polygons in pixels, got corners up to {largest:g}, which seem to be "
+                "shares of the picture's sides"
+            )
 
     def _error(self, expected: str) -> InputError:
         return InputError(f"{self._path}: expected {expected}")
 
     def _category(
         self, categories: Sequence[Mapping[str, Any]], wanted: str | None
-    ) -> Any:
-        """Return the number of the people's category."""
-        named = {str(each.get("name")): each.get("id") for each in categories}
+    ) -> set[Any]:
+        """Return the numbers of the people's category, which may be listed twice."""
+        named = defaultdict[str, set[Any]](set)
+        for each in categories:
+            named[str(each.get("name"))].add(_key(each.get("id")))
         if wanted is None and len(named) == 1:
             (wanted,) = named
         elif wanted is None:
@@ -167,12 +219,12 @@ class _Content:
         """Return the images by the name of their file."""
         found = dict[str, Any]()
         for image in images:
-            sides = image.get("width"), image.get("height")
+            sides = _key(image.get("width")), _key(image.get("height"))
             name = image.get("file_name")
             if not isinstance(name, str) or not name:
                 raise self._error(f"images with a file_name, got {quoted(name)}")
             whole = all(type(side) is int and side > 0 for side in sides)
-            if not whole or sides[0] * sides[1] > PIXELS:  # type: ignore[operator]
+            if not whole or sides[0] * sides[1] > PIXELS:
                 raise self._error(
                     f"images of up to {PIXELS // 10**6} million pixels, "
                     f"got {sides[0]}x{sides[1]}"
@@ -184,12 +236,35 @@ class _Content:
                 "width": sides[0],
                 "height": sides[1],
             }
+        numbers = Counter(each["id"] for each in found.values())
+        for number, count in numbers.items():
+            if count > 1:
+                raise self._error(
+                    f"images with an id each, got {quoted(number)} for {count} images"
+                )
         sizes = {(each["width"], each["height"]) for each in found.values()}
         if len(sizes) != 1:
             raise self._error(f"images of one size, got {len(sizes)} sizes")
         return found
 
-    def mask(self, shape: Any, size: tuple[int, int]) -> Mask:
+    def masks(self, image: Any, size: tuple[int, int]) -> tuple[Mask, Mask]:
+        """Return the pixels of the people in an image, and of its crowds.
+
+        Some programs mark every run of pixels as a crowd: if an image has nothing else,
+        its crowds are people.
+        """
+        people = np.zeros((size[1], size[0]), dtype=bool)
+        crowds = np.zeros((size[1], size[0]), dtype=bool)
+        shapes = self.shapes[image]
+        only_crowds = all(crowd for _, crowd in shapes)
+        for shape, crowd in shapes:
+            if crowd and not only_crowds:
+                crowds |= self._mask(shape, size)
+            else:
+                people |= self._mask(shape, size)
+        return people, crowds
+
+    def _mask(self, shape: Any, size: tuple[int, int]) -> Mask:
         """Return the pixels of one annotation's `segmentation`."""
         try:
             if isinstance(shape, Mapping):
@@ -205,8 +280,18 @@ class _Content:
 
 
 def _key(value: Any) -> Any:
-    """Return a number or a name of an image, whatever else a file may have there."""
+    """Return a whole number or a name, whatever else a file may have there."""
+    if isinstance(value, float) and value.is_integer():
+        return int(value)
     return value if isinstance(value, int | str) else None
+
+
+def _largest(corners: Any) -> float:
+    """Return the largest number of a polygon; infinite if it is none."""
+    try:
+        return float(np.max(np.array(corners, dtype=np.float64), initial=0.0))
+    except (TypeError, ValueError):
+        return float("inf")
 
 
 def filled(corners: Array, size: tuple[int, int]) -> Mask:

@@ -24,6 +24,7 @@ PIXELS = 50_000_000
 LARGEST_FILE = 8 * PIXELS
 FORMATS = "PNG, JPEG, BMP, TIFF, PGM, GIF or WebP"  # as messages call them
 _FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "PPM", "GIF", "WEBP")  # Pillow's names
+ORIENTATION = 0x0112  # the tag of EXIF that says how a picture is turned
 _JPEG = ("JPEG", "MPO")  # phones write MPO, a JPEG with a preview
 # levels of 255 between the channels of a pixel that is not grey
 COLOUR_RANGE = 32
@@ -184,6 +185,10 @@ def _marks(image: Image.Image, labelled: bool) -> Marks:
     """Return how an image marks a person, see `read_marks`."""
     if image.format in _JPEG:
         return _jpeg_marks(image)
+    if image.getexif().get(ORIENTATION, 1) != 1:
+        upright = ImageOps.exif_transpose(image)
+        upright.format = image.format
+        image = upright
     if not labelled and image.has_transparency_data:
         transparent = _transparent_marks(image)
         if transparent is not None:

@@ -165,6 +165,7 @@ def resolve(source: Any) -> Resolved:
         # every output file states these names, so OpenCV's limits are checked first
         if isinstance(each, str | Path | tuple):
             opencv_name(each[0] if isinstance(each, tuple) else each)
+    _check_each_once(named)
     places = [_place(each) for each in named]
     kinds = [_kind_of(place) for place in places]
     media = {kind.medium for kind in kinds}
@@ -181,6 +182,26 @@ def resolve(source: Any) -> Resolved:
     places = _with_numbers(places)
     names = [_name_of(place) for place in places]
     return Resolved(medium, named, names, places, kinds)
+
+
+def _check_each_once(named: Sequence[Footage]) -> None:
+    """Raise InputError if two cameras have the same source."""
+    seen = list[Any]()
+    for each in named:
+        key = each
+        if isinstance(each, str | Path):
+            key = Path(each).resolve()
+        if any(key is other or _is_same(key, other) for other in seen):
+            what = "the same array"
+            if not isinstance(each, np.ndarray):
+                what = str(each[0] if isinstance(each, tuple) else each)
+            raise InputError(f"each camera must have its own source, got {what} twice")
+        seen.append(key)
+
+
+def _is_same(one: Any, other: Any) -> bool:
+    """Return whether two sources are equal; arrays are not compared."""
+    return isinstance(one, Path | tuple) and type(one) is type(other) and one == other
 
 
 def _kind_of(place: Place) -> Kind:

@@ -18,6 +18,14 @@ _FORMATS = {".jpeg": ".jpg", ".tiff": ".tif"}  # two suffixes of one format
 MOST_MISSING = 9.0
 # digits of a number that still fits in 64 bits
 DIGITS = 18
+# most objects or cameras that the last number of names counts, if it is not the frame
+MOST_OBJECTS = 8
+# words before a number that counts no frames
+_NO_FRAME = re.compile(
+    r"(^|[^a-z])(cam(era)?|view|obj(ect)?|person|id|inst(ance)?|track|player|subject"
+    r"|label)[^a-z]*$",
+    re.IGNORECASE,
+)
 
 
 class Images(NamedTuple):
@@ -68,13 +76,15 @@ def numbered(images: Sequence[Path], name: str) -> Numbered:
         name: What messages call them.
 
     Raises:
-        InputError: Files have several formats, or two files have the same number. Some
-            of them are probably not masks.
+        InputError: Files have several formats, two files have the same number, or some
+            have none. Some of them are probably not masks, or of another camera.
 
     """
     _check_one_kind(images, name)
     # text, number, text, number, ..., text
     parts = [re.split(r"([0-9]+)", file.stem) for file in images]
+    _check_all_numbered(images, parts, name)
+    _check_one_a_frame(images, parts, name)
     column = _counting_column(parts)
     if len(images) < 2 or not all(
         len(part) >= 3 and len(part[column]) <= DIGITS for part in parts
@@ -113,14 +123,59 @@ def _check_one_kind(images: Sequence[Path], name: str) -> None:
         )
 
 
+def _check_all_numbered(
+    images: Sequence[Path], parts: Sequence[Sequence[str]], name: str
+) -> None:
+    """Raise InputError if a few of many images have no number in their names."""
+    others = [
+        image for image, part in zip(images, parts, strict=True) if len(part) == 1
+    ]
+    if 0 < 2 * len(others) <= len(images):
+        raise InputError(
+            f"{name}: expected a number in the name of every image, got "
+            f"{others[0].name}; name the files, such as masks/*_*.png"
+        )
+
+
+def _check_one_a_frame(
+    images: Sequence[Path], parts: Sequence[Sequence[str]], name: str
+) -> None:
+    """Raise InputError if names seem to count objects or cameras in each frame.
+
+    Such names have two numbers that change. One has a word such as `cam` before it, or
+    is the last one and takes few values, while most pairs of the two are there.
+    """
+    if _texts_differ(parts):
+        return
+    columns = _changing(parts)
+    if len(columns) == 1 and len({file.parent for file in images}) > 1:
+        _check_each_once(images, [int(part[columns[0]]) for part in parts], name)
+    if len(columns) != 2:
+        return
+    values = {column: [int(part[column]) for part in parts] for column in columns}
+    for column, other in (columns, columns[::-1]):
+        objects = len(set(values[column]))
+        frames = len(set(values[other]))
+        is_named = _NO_FRAME.search(parts[0][column - 1])
+        is_few = column > other and objects < frames and objects <= MOST_OBJECTS
+        if (is_named or is_few) and 2 * len(images) >= objects * frames:
+            _check_each_once(images, values[other], name)
+
+
 def _check_each_once(images: Sequence[Path], numbers: Sequence[int], name: str) -> None:
     """Raise InputError if two images have the same number."""
     first = dict[int, Path]()
     for number, image in zip(numbers, images, strict=True):
         if number in first:
+            one, other = first[number], image
+            if one.name == other.name:
+                raise InputError(
+                    f"{name}: expected one image a frame, got {one} and {other}; give "
+                    "the folder of each camera"
+                )
             raise InputError(
-                f"{name}: expected one image a frame, got {first[number].name} and "
-                f"{image.name}; name the files, such as masks/*.png"
+                f"{name}: expected one image a frame, got {one.name} and "
+                f"{other.name}; name the files that count, such as masks/*_1.png"
             )
         first[number] = image
 
@@ -138,12 +193,18 @@ def _counting_column(parts: Sequence[Sequence[str]]) -> int:
     last_number = -2
     if _texts_differ(parts):
         return last_number
+    changing = _changing(parts)
+    return changing[0] if len(changing) == 1 else last_number
+
+
+def _changing(parts: Sequence[Sequence[str]]) -> list[int]:
+    """Return which numbers change in names that have the same texts."""
     changing = list[int]()
     for column, texts in enumerate(zip(*parts, strict=True)):
         # 7 and 007 are the same number
         if len({text.lstrip("0") for text in texts}) > 1:
             changing.append(column)
-    return changing[0] if len(changing) == 1 else last_number
+    return changing
 
 
 def _spread(places: Mapping[int, Path], numbers: range, name: str) -> Numbered:

@@ -4,6 +4,8 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from posefit.errors import InputError
 from posefit.footage.images import IMAGES
 from posefit.footage.readers import ARRAYS
@@ -41,7 +43,10 @@ def _mistaken_for_calibration(path: Path) -> str:
     """Return what a path is if it cannot be a calibration, or else ""."""
     suffix = path.suffix.lower()
     if suffix in ARRAYS:
-        return "a file of masks"
+        return (
+            "arrays: a calibration is a text, as json.dump({name: array.tolist() for "
+            "name, array in numpy.load(FILE).items()}, ...) writes it"
+        )
     if suffix in IMAGES:
         return "an image"
     return "a folder" if path.is_dir() else ""
@@ -86,12 +91,31 @@ def calibrated(
             "camera must say where each of several cameras stands, got a file without "
             "rotation"
         )
+    if views > 1:
+        _check_places(known)
     if views > 1 and len(names) == views:
         known = [known[k] for k in order_by_name(known, names)]
     for camera, size in zip(known, filmed, strict=False):
         if isinstance(camera, Calibration) and size is not None:
             fitting(camera, size, scaled=False)
     return known
+
+
+def _check_places(cameras: Sequence[Camera | Calibration]) -> None:
+    """Raise InputError if two cameras are at one place and look the same way."""
+    seen = list[tuple[bytes, str]]()
+    for number, camera in enumerate(cameras, 1):
+        if camera.rotation is None or camera.translation is None:
+            continue
+        place = np.column_stack([camera.rotation, camera.translation])
+        name = camera.name if isinstance(camera, Calibration) else f"camera {number}"
+        for other, its_name in seen:
+            if other == place.tobytes():
+                raise InputError(
+                    "cameras must stand at different places, got one place and one "
+                    f"direction for {its_name} and {name}"
+                )
+        seen.append((place.tobytes(), name))
 
 
 def order_by_name(

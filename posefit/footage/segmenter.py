@@ -19,7 +19,7 @@ from posefit.footage.images import read_image
 from posefit.footage.quality import FrameQuality
 from posefit.footage.video import Video, scaled
 from posefit.geometry.skeleton import JOINTS
-from posefit.reading import quoted
+from posefit.reading import existing, quoted
 from posefit.registry import registry
 from posefit.silhouette.foreground import BRIGHT, Image, Person, Segmenter, people
 from posefit.silhouette.mask import Mask
@@ -46,8 +46,10 @@ class PartOfVideo:
     def picture(self, path: str) -> Image:
         """Return a picture of the video's size, scaled and cut as the video.
 
-        Raises InputError if the file is not a picture, or has another size.
+        Raises InputError if the file is missing, is not a picture, or has another size.
         """
+        if Path(path).suffix:
+            existing(Path(path))
         image = read_image(path, grey=False)
         if image is None:
             raise InputError(

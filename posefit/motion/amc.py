@@ -23,7 +23,7 @@ from posefit.geometry.rotation import (
 from posefit.geometry.skeleton import ANGLES, Skeleton, channel_angles
 from posefit.geometry.units import CMU_UNIT, Unit
 from posefit.limits import RATES
-from posefit.motion.asf import parse_asf
+from posefit.motion.asf import FULL_TURN, parse_asf
 from posefit.motion.lines import Line, lines_of
 from posefit.motion.motion import LONGEST, Motion
 from posefit.reading import check_size, quoted
@@ -32,6 +32,7 @@ FPS = 120.0  # CMU's rate; its files do not state it
 RATE = re.compile(r"#\s*(\S{1,40}) frames a second")  # in posefit's own files
 SIZE_LIMIT = 500_000_000  # bytes
 LONGEST_LINE = 10_000  # bytes; the root's line has about 60
+LEAST = 0.5  # a file whose angles are all smaller than this is of a rest pose
 VALUES = 20_000_000  # numbers in a file: 200,000 frames of 100 channels
 
 Spans = dict[str, tuple[int, int]]  # bone: start and stop of its values in a frame
@@ -99,6 +100,9 @@ def read_amc(
     if not (fps or stated):
         assumed = f"{FPS:g} frames a second are assumed; --rate sets it"
         notes = (f"{path}: the file does not state its rate: {assumed}",)
+    # of the joints, as a root may turn round and round
+    if said := doubtful_angles(values[:, 6:], radians=radians):
+        notes = (*notes, f"{path}: {said}")
     angles = values if radians else np.deg2rad(values)
     poses = np.zeros((len(values), ANGLES))
     # the file turns the root about x, y, z; a pose has yaw, pitch and roll
@@ -112,6 +116,22 @@ def read_amc(
         rate,
         notes=notes,
     )
+
+
+def doubtful_angles(angles: Array, *, radians: bool) -> str:
+    """Return what is doubtful about the unit of joints' angles, or "".
+
+    Args:
+        angles: The angles (T, n) as a file has them.
+        radians: Whether the file says that they are radians.
+
+    """
+    largest = float(np.abs(angles).max(initial=0.0))
+    if radians and largest > FULL_TURN:
+        return f"angles of up to {largest:.4g} radians seem to be degrees"
+    if not radians and LEAST < largest <= FULL_TURN:
+        return f"angles of at most {largest:.3g} degrees may be radians"
+    return ""
 
 
 def _layout(skeleton: Skeleton) -> tuple[Spans, NDArray[np.int64], NDArray[np.int64]]:

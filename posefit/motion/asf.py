@@ -36,6 +36,7 @@ from posefit.motion.lines import LARGEST, Line, lines_of
 from posefit.reading import check_size, quoted
 
 SIZE_LIMIT = 1_000_000  # bytes; CMU's files have 7,000
+FULL_TURN = 2.0 * np.pi  # radians
 ROOT_CHANNELS = ("TX", "TY", "TZ", "RX", "RY", "RZ")
 # bones that a Skeleton knows only by their channels, and their parents
 _FINGERS = {
@@ -217,6 +218,8 @@ def _bone(block: dict[str, Line], radians: float) -> _Bone:
     if len(axis.words) != 5 or axis.words[4].upper() != "XYZ":
         raise axis.mistake("axis order XYZ")
     angles = np.array(axis._replace(words=axis.words[:4]).numbers(3))
+    if np.abs(angles * radians).max() > FULL_TURN:
+        raise axis.mistake("an axis of up to 360 degrees, or 6.28 radians")
     free: tuple[str, ...] = ()
     if "dof" in block:
         free = tuple(word.lower() for word in block["dof"].words[1:])

@@ -11,6 +11,7 @@ posefit's skeleton.
 from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,7 @@ from posefit.geometry.calibration import TURNS, Up
 from posefit.geometry.rotation import angles_about, rotation_about, steady_angles
 from posefit.geometry.skeleton import ENDS, JOINTS, PARENTS
 from posefit.geometry.units import METRES, UNIT_NAMES, UNITS, Unit, metres_of, unit_of
-from posefit.motion.amc import SIZE_LIMIT, VALUES
+from posefit.motion.amc import SIZE_LIMIT, VALUES, doubtful_angles
 from posefit.motion.joint_names import joints_of, part_of
 from posefit.motion.lines import LARGEST, Line, lines_of
 from posefit.motion.motion import LONGEST, Motion
@@ -62,6 +63,12 @@ FRAME_TIMES = (1e-4, 10.0)  # seconds
 # relative difference between a rate and the nearest whole number within which the whole
 # number is taken: files state 0.0083333 for 1 / 120
 WHOLE_RATE = 1e-4
+# rates that programs write, whose frame times files round to a few digits
+USUAL_RATES = (
+    # whole ones, and those of NTSC
+    (24, 25, 30, 48, 50, 60, 72, 90, 100, 120, 144, 150, 180, 200, 240, 250, 300),
+    tuple(whole * 1000.0 / 1001.0 for whole in (24, 30, 60, 120, 240)),
+)
 MISSED = 1e-3  # metres that a joint may be off its place in the file without a note
 
 
@@ -90,7 +97,7 @@ def read_bvh(
     path = Path(path)
     known = None if unit is None else metres_of(unit)
     check_size(path, SIZE_LIMIT)
-    nodes, values, fps = _parsed(path)
+    nodes, values, (frame_time, fps) = _parsed(path)
     try:
         rig = _rig(nodes, values)
         others = _others(rig)
@@ -117,6 +124,12 @@ def read_bvh(
         notes.append(
             f"{path}: the person with the root {followed} is read, {left_out} left out"
         )
+    if abs(frame_time * fps - 1.0) > WHOLE_RATE:
+        notes.append(
+            f"{path}: frames of {frame_time:g} s are taken as {fps:.5g} a second"
+        )
+    if said := doubtful_angles(_turning(nodes, values), radians=False):
+        notes.append(f"{path}: {said}")
     if unit is None and chosen != "m":
         notes.append(
             f"{path}: lengths are taken as {UNIT_NAMES[chosen]}, because the "
@@ -180,15 +193,25 @@ class _Node:
     column: int = 0  # column of the first channel
 
 
-def _parsed(path: Path) -> tuple[list[_Node], Array, float]:
-    """Return a file's nodes, values (T, channels) and rate.
+def _turning(nodes: Sequence[_Node], values: Array) -> Array:
+    """Return the values (T, n) of the channels that turn joints below the root."""
+    columns = list[int]()
+    for node in nodes[1:]:
+        for k, (turns, _) in enumerate(node.channels):
+            if turns:
+                columns.append(node.column + k)
+    return values[:, columns]
+
+
+def _parsed(path: Path) -> tuple[list[_Node], Array, tuple[float, float]]:
+    """Return a file's nodes, values (T, channels), and frame time and rate.
 
     Raises:
         InputError: the file is not a BVH file; the message has the line.
     """
     lines = lines_of(path, LONGEST_LINE)
     nodes, width = _hierarchy(lines)
-    count, frame_time = _head(lines)
+    count, times = _head(lines)
     # an array takes a quarter of the memory of a list of numbers
     data = array("d")
     rows = 0
@@ -214,10 +237,7 @@ def _parsed(path: Path) -> tuple[list[_Node], Array, float]:
             f"{path}: expected finite numbers below {LARGEST:g}, "
             f"got {np.abs(values).max()}"
         )
-    rate = 1.0 / frame_time
-    if abs(rate - round(rate)) < WHOLE_RATE * rate:
-        rate = float(round(rate))
-    return nodes, values, rate
+    return nodes, values, times
 
 
 def _hierarchy(lines: Iterator[Line]) -> tuple[list[_Node], int]:
@@ -270,8 +290,8 @@ def _hierarchy(lines: Iterator[Line]) -> tuple[list[_Node], int]:
             waiting = False
 
 
-def _head(lines: Iterator[Line]) -> tuple[int, float]:
-    """Return the stated number of frames, and the seconds of a frame."""
+def _head(lines: Iterator[Line]) -> tuple[int, tuple[float, float]]:
+    """Return the stated number of frames, the seconds of a frame, and the rate."""
     count = -1
     while True:
         line = next(lines)
@@ -292,9 +312,30 @@ def _head(lines: Iterator[Line]) -> tuple[int, float]:
                 raise line.mistake(
                     f"a frame time of {low:g} to {high:g} s", f"{frame_time:g}"
                 )
-            return count, frame_time
+            return count, (frame_time, _rate(line.words[2]))
         else:
             raise line.mistake("Frames: and Frame Time:")
+
+
+def _rate(word: str) -> float:
+    """Return the rate of a frame time, which may have been rounded or cut off."""
+    frame_time = Decimal(word)
+    rate = 1.0 / float(frame_time)
+    if abs(rate - round(rate)) < WHOLE_RATE * rate:
+        return float(round(rate))
+    digits = frame_time.as_tuple().exponent
+    last = 10.0**digits if isinstance(digits, int) else 0.0
+
+    def off(usual: float) -> float:
+        return abs(1.0 / usual - float(frame_time))
+
+    # rounded, or else cut off
+    for most in (0.5 * last, last):
+        for usual in USUAL_RATES:
+            nearest = min(usual, key=off)
+            if off(nearest) <= most:
+                return float(nearest)
+    return rate
 
 
 def _channels(line: Line) -> list[tuple[bool, int]]:

@@ -166,7 +166,8 @@ def skeleton_file(amc: Path, asf: str | Path | None) -> Path:
     if asf is not None:
         return existing(Path(asf))
     existing(amc)
-    found = sorted(amc.parent.glob("*.asf"))
+    files = amc.parent.iterdir()
+    found = [file for file in files if file.suffix.lower() == ".asf"]
     if len(found) != 1:
         raise InputError(
             f"{amc}: expected --asf or exactly one .asf file in its folder, "

@@ -12,7 +12,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.report.columns import mean
 from posefit.report.contest import Contest
-from posefit.statistics.means import Intervals, block_means
+from posefit.statistics.means import Intervals
 from posefit.statistics.profiles import Trace, performance_profile
 from posefit.uncertainty.calibration import LEVELS
 
@@ -126,7 +126,7 @@ def convergence(contest: Contest, evaluations: Array) -> list[Line | None]:
         run ends.
     """
 
-    def line(rows: Array) -> Line | None:
+    def line(place: int, rows: Array) -> Line | None:
         traces: Sequence[Trace] = contest.data("traces", rows)
         if not all(len(used) for used, _ in traces):
             return None
@@ -140,10 +140,10 @@ def convergence(contest: Contest, evaluations: Array) -> list[Line | None]:
             # the last improvement at or before each point
             places = np.searchsorted(used, points, side="right") - 1
             costs.append(best[places])
-        means = block_means(np.array(costs).T, contest.instance)  # of (points, runs)
+        means = contest.means(place, np.array(costs).T)  # of (points, runs)
         return Line(points, means.values, means.low, means.high)
 
-    return [line(rows) for rows in contest.blocks]
+    return [line(place, rows) for place, rows in enumerate(contest.blocks)]
 
 
 def joint_errors(contest: Contest) -> list[Intervals]:
@@ -152,12 +152,11 @@ def joint_errors(contest: Contest) -> list[Intervals]:
     The list is empty if a run lacks the error of a joint.
     """
     intervals = []
-    for rows in contest.blocks:
+    for place, rows in enumerate(contest.blocks):
         joints = np.array(contest.data("joint_errors", rows))  # (blocks, 27)
         if not np.isfinite(joints).all():
             return []
-        values = joints.T.astype(np.float64)
-        intervals.append(block_means(values, contest.instance))
+        intervals.append(contest.means(place, joints.T.astype(np.float64)))
     return intervals
 
 

@@ -11,6 +11,7 @@ from posefit.arrays import Array
 from posefit.evaluation.measures import Measure
 from posefit.reading import counted
 
+LEAST_P = 0.001  # texts only say that a p is lower
 NAMED = 4  # the most names that a sentence lists; of others it gives the number
 _SYMBOLS = {"degrees": "°"}  # short forms of units, for titles of columns
 
@@ -44,6 +45,7 @@ class Column:
         in_tables: Whether tables show it.
         optional: Whether tables show it only if some row has it. Only methods with an
             uncertainty have such figures.
+        brief: Whether the table of all runs shows it without a click.
         average: Returns the average of several runs.
     """
 
@@ -51,6 +53,7 @@ class Column:
     higher_is_better: bool = False
     in_tables: bool = True
     optional: bool = False
+    brief: bool = False
     average: Callable[[Array], float | None] = mean
 
     @property
@@ -75,6 +78,7 @@ class Column:
             "digits": measure.digits,
             "factor": measure.factor,
             "down": self.higher_is_better,
+            "brief": self.brief,
         }
 
 
@@ -83,30 +87,51 @@ class Score:
     """The figure by which methods are ordered, and the texts that depend on it.
 
     Attributes:
-        name: The figure's name.
+        column: The figure.
         title: The title of its column in a printed table.
         axis: The label of its axis.
         sentence: A part of a sentence, with `{}` for the value.
         unit: The unit of its values.
         points: The unit of differences between values.
-        digits: Its digits after the point.
-        down: Whether a higher value is better.
         paired: The blocks of paired tests, in the plural: runs or instances.
         caption: The caption of the first figure.
         leaderboard: The text above the leaderboard.
     """
 
-    name: str
+    column: Column
     title: str
     axis: str
     sentence: str
     unit: str
     points: str
-    digits: int
-    down: bool
     paired: str
     caption: str
     leaderboard: str
+
+    @property
+    def name(self) -> str:
+        """The figure's name."""
+        return self.column.name
+
+    @property
+    def digits(self) -> int:
+        """Its digits after the point."""
+        return self.column.measure.digits
+
+    @property
+    def down(self) -> bool:
+        """Whether a higher value is better."""
+        return self.column.higher_is_better
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the data with which the page shows the score."""
+        texts = {name: text for name, text in vars(self).items() if name != "column"}
+        return {
+            **texts,
+            "name": self.name,
+            "digits": self.digits,
+            "down": self.down,
+        }
 
     def text(self, value: float) -> str:
         """Return a value with its digits and unit."""
@@ -123,7 +148,7 @@ class Score:
 
 def p_text(p: float) -> str:
     """Return the text of a p, such as `p = 0.034` or `p < 0.001`."""
-    return "p < 0.001" if p < 0.001 else f"p = {p:.2g}"
+    return f"p < {LEAST_P}" if p < LEAST_P else f"p = {p:.2g}"
 
 
 def listed(values: Sequence[Any], most: int = NAMED) -> str:

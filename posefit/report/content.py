@@ -8,29 +8,33 @@ from typing import Any
 
 from posefit.errors import printable
 from posefit.reading import counted
+from posefit.report.columns import LEAST_P
 from posefit.report.contest import Contest, Runs
-from posefit.report.leaderboard import contest_of, leaderboard
+from posefit.report.leaderboard import Standings
 from posefit.report.page import COLOUR_COUNT
 from posefit.report.summary import leader_sentences, unpaired_sentence
+from posefit.statistics.paired import POWER, SIGNIFICANCE
 from posefit.sweep.ledger import Ledger
 
 # How many the first screen names: the most frequent failures and warnings, and the
 # instances that are not compared.
 REASONS = 5
 MAX_MISSING = 20
+MAX_BLOCKS = 1_000_000  # tables only say that more are needed
 
 
-def data_of(ledger: Ledger, runs: Runs) -> dict[str, Any]:
+def data_of(ledger: Ledger, runs: Runs, standings: Standings | None) -> dict[str, Any]:
     """Return the data of the page about a ledger's runs.
 
     Args:
         ledger: The ledger, open.
         runs: Its runs.
+        standings: Their standings, None if no run has an error.
 
     Returns:
         The data by name. `sections` lists the sections of the page.
     """
-    contest = contest_of(runs)
+    contest = standings.contest if standings else None
     kind = runs.kind
     date = time.strftime("%d %B %Y", time.localtime(ledger.changed))
     # each text once, as many runs have the same
@@ -57,22 +61,25 @@ def data_of(ledger: Ledger, runs: Runs) -> dict[str, Any]:
         "header": _header(runs, contest),
         "methods": methods,
         "instances": [{"name": name} for name in runs.instances],
-        "baseline_names": kind.baselines,
-        "colours": COLOUR_COUNT,
+        "constants": {
+            "colours": COLOUR_COUNT,
+            "significance": SIGNIFICANCE,
+            "power": POWER,
+            "least_p": LEAST_P,
+            "max_blocks": MAX_BLOCKS,
+        },
         "columns": {name: kind.columns[name].as_dict() for name in runs.table_figures},
-        "score": vars(kind.score),
+        "score": kind.score.as_dict(),
         "warnings": warnings,
         "warned": warned,
-        "failures": runs.failures,
+        "failures": [vars(failure) for failure in runs.failures],
     }
-    if contest is not None:
-        board = leaderboard(contest)
-        baselines = kind.baseline_rows(contest)
+    if standings is not None:
         data |= {
-            "answer": leader_sentences(contest, board, baselines),
-            "leaderboard": board,
-            "baselines": baselines,
-            "taking_part": contest.methods,
+            "answer": leader_sentences(standings),
+            "leaderboard": [row.as_dict() for row in standings.board],
+            "baselines": [baseline.as_dict() for baseline in standings.baselines],
+            "taking_part": standings.contest.methods,
         }
     data |= kind.page(runs, contest)
     if runs.failures:
@@ -127,7 +134,7 @@ def _problems(runs: Runs, contest: Contest | None) -> list[tuple[str, list[str]]
     if runs.failures:
         reasons: Counter[str] = Counter()
         for failure in runs.failures:
-            reasons.update(failure["reasons"])
+            reasons.update(failure.reasons)
         text = "; ".join(f"{name} {count}" for name, count in runs.failed.items())
         failed = counted(len(runs.failures), "cell")
         add(

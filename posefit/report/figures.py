@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING
 from posefit.errors import InputError
 from posefit.files import Unfinished, other_entries
 from posefit.report.charts import Chart, track_charts
-from posefit.report.columns import Score
-from posefit.report.contest import Row, Runs
-from posefit.report.leaderboard import contest_of, leaderboard
+from posefit.report.leaderboard import Standings
 from posefit.report.page import LIGHT
 from posefit.report.table import board_rows
 from posefit.sweep.table import write_csv
@@ -95,23 +93,22 @@ def chart_figure(
     return figure
 
 
-def board_figure(
-    score: Score, board: Sequence[Row], baselines: Sequence[tuple[str, float]]
-) -> "Figure":
+def board_figure(standings: Standings) -> "Figure":
     """Return a figure of the leaderboard.
 
-    Args:
-        score: The figure that orders the methods.
-        board: The rows of the leaderboard. Each has a marker and an interval.
-        baselines: The name and value of each baseline, drawn as vertical lines.
+    Each method has a marker and an interval, and each baseline a vertical line.
 
-    Returns:
-        The figure.
-
-    Raises:
-        ImportError: matplotlib is not installed.
+    Raises ImportError if matplotlib is not installed.
     """
-    rows = [row for row in board if row[score.name] is not None]
+    score = standings.contest.runs.kind.score
+    rows = []
+    for row in standings.board:
+        if (value := row.figures[score.name]) is not None:
+            rows.append((row, value))
+    baselines = []
+    for baseline in standings.baselines:
+        if (value := baseline.figures[score.name]) is not None:
+            baselines.append((baseline.title, value))
     height = 0.9 + 0.3 * len(rows) + 0.15 * len(baselines)
     bottom = len(rows) - 0.5
     top = -0.6
@@ -119,12 +116,12 @@ def board_figure(
     axes = figure.add_subplot(xlabel=score.axis)
     axes.spines[["top", "right", "left"]].set_visible(False)
     axes.tick_params(axis="y", length=0)
-    for place, row in enumerate(rows):
-        colour = COLOURS[row["method"] % len(COLOURS)]
-        if row["low"] is not None:
-            axes.plot([row["low"], row["high"]], [place, place], color=colour)
-        marker = MARKERS[row["method"] % len(MARKERS)]
-        axes.plot(row[score.name], place, marker=marker, color=colour)
+    for place, (row, value) in enumerate(rows):
+        colour = COLOURS[row.method % len(COLOURS)]
+        if row.interval:
+            axes.plot(row.interval, [place, place], color=colour)
+        marker = MARKERS[row.method % len(MARKERS)]
+        axes.plot(value, place, marker=marker, color=colour)
     # each name is above the one to the left, because baselines may be close together
     for name, value in sorted(baselines, key=itemgetter(1)):
         top -= 0.5
@@ -132,7 +129,7 @@ def board_figure(
             [value, value], [top, bottom], color="0.5", linestyle=":", lw=1.0, zorder=0
         )
         axes.text(value, top, f" {_plain(name)}", va="top", fontsize=7, color="0.35")
-    axes.set_yticks(range(len(rows)), [_plain(row["name"]) for row in rows])
+    axes.set_yticks(range(len(rows)), [_plain(row.name) for row, _ in rows])
     axes.set_ylim(bottom, top)
     axes.set_xlim(left=0.0)
     return figure
@@ -172,36 +169,27 @@ def check_folder(path: str | Path) -> None:
         )
 
 
-def write_figures(runs: Runs, path: str | Path) -> None:
+def write_figures(standings: Standings, path: str | Path) -> None:
     """Write a folder of figures, as PNG and PDF, and of the leaderboard, as CSV.
 
     An earlier folder of figures is replaced. Figures without data are left out.
 
     Args:
-        runs: The runs of a ledger.
+        standings: The standings of the methods of a ledger of tracks.
         path: The folder.
 
     Raises:
-        ValueError: No run has an error, the path exists and is not a folder of figures,
-            or it cannot be written.
+        ValueError: The path exists and is not a folder of figures, or it cannot be
+            written.
         ImportError: matplotlib is not installed.
     """
-    contest = contest_of(runs)
-    if contest is None:
-        raise InputError("figures need runs with errors, got none")
-    board = leaderboard(contest)
-    names = [runs.methods[m] for m in contest.methods]
+    contest = standings.contest
+    names = [contest.runs.methods[m] for m in contest.methods]
     order = []
-    for row in board:
-        if row["taking_part"]:
-            order.append(contest.methods.index(row["method"]))
-    score = runs.kind.score
-    baselines = []
-    for row in runs.kind.baseline_rows(contest):
-        if row[score.name] is not None:
-            title = runs.kind.baselines[row["baseline"]]
-            baselines.append((title, row[score.name]))
-    figures = {"leaderboard": board_figure(score, board, baselines)}
+    for row in standings.board:
+        if row.taking_part:
+            order.append(contest.methods.index(row.method))
+    figures = {"leaderboard": board_figure(standings)}
     for chart in track_charts(contest):
         figures[chart.name] = chart_figure(names, chart, contest.methods, order)
     check_folder(path)
@@ -211,7 +199,7 @@ def write_figures(runs: Runs, path: str | Path) -> None:
             for name, figure in figures.items():
                 for kind in ("png", "pdf"):
                     save(figure, unfinished.path / f"{name}.{kind}")
-            write_csv(board_rows(runs, board), unfinished.path / TABLE)
+            write_csv(board_rows(standings), unfinished.path / TABLE)
             unfinished.finish(NAMES, replace=True)
         except BaseException:
             unfinished.remove(NAMES)

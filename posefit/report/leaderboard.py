@@ -1,33 +1,102 @@
-"""The methods of a sweep compared on the runs that they share."""
+"""The leaderboard: the methods of a sweep in order, compared on the runs they share."""
 
 import math
-from dataclasses import astuple
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 from typing import Any
 
-from posefit.report.contest import Contest, Runs
+from posefit.report.contest import Baseline, Contest, Runs, contest_of
 from posefit.statistics.paired import SIGNIFICANCE
-from posefit.statistics.pairing import most_shared
-
-EFFECT = ("behind", "behind_low", "behind_high", "p", "blocks_needed")
 
 
-def contest_of(runs: Runs) -> Contest | None:
-    """Return the contest of the methods that share enough runs.
+@dataclass(frozen=True, kw_only=True)
+class Effect:
+    """How far a method is behind the first one.
 
-    A method does not take part if it would leave less than half of the runs that the
-    others share.
-
-    Args:
-        runs: All runs of a ledger.
-
-    Returns:
-        The contest, or None if no run has an error.
+    Attributes:
+        behind: The mean difference in paired runs, above 0 if the method is worse.
+        behind_low: The lower end of its interval, nan if there are too few runs.
+        behind_high: The upper end.
+        p: Of the paired test, after Holm's correction.
+        blocks_needed: How many paired runs would show such a difference.
     """
-    shared = most_shared(runs.method, runs.instance, runs.seed, runs.scores)
-    return None if shared is None else Contest(**vars(shared), runs=runs)
+
+    behind: float
+    behind_low: float
+    behind_high: float
+    p: float
+    blocks_needed: float
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether the methods are equal in all runs."""
+        return self.behind_low == self.behind_high == 0.0
 
 
-def leaderboard(contest: Contest) -> list[dict[str, Any]]:
+EFFECT = tuple(field.name for field in fields(Effect))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Standing:
+    """A row of the leaderboard.
+
+    Attributes:
+        method: The method's index in the runs.
+        name: Its name.
+        settings: Its settings as a text.
+        runs: The number of runs that its figures are of.
+        failed: The number of its quarantined cells.
+        warned: The number of its runs with a warning.
+        taking_part: Whether it shares enough runs to be compared.
+        figures: The average of each figure by name, None if it is unknown.
+        interval: The ends of the score's 95 % interval, or None.
+        lost_tracks: The number of its runs that lost frames; None for searches.
+        effect: Its distance from the first method. None for the first one, and without
+            a test.
+    """
+
+    method: int
+    name: str
+    settings: str
+    runs: int
+    failed: int
+    warned: int
+    taking_part: bool
+    figures: Mapping[str, float | None]
+    interval: tuple[float, float] | None
+    lost_tracks: int | None
+    effect: Effect | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return everything by name, figures and parts of the effect as well."""
+        values = dict(vars(self))
+        figures = values.pop("figures")
+        effect = values.pop("effect")
+        values["low"], values["high"] = values.pop("interval") or (None, None)
+        if self.lost_tracks is None:
+            del values["lost_tracks"]
+        effects = vars(effect) if effect else dict.fromkeys(EFFECT)
+        return {**values, **figures, **effects}
+
+
+@dataclass(frozen=True, eq=False)
+class Standings:
+    """A contest with its leaderboard and its baselines."""
+
+    contest: Contest
+    board: Sequence[Standing]
+    baselines: Sequence[Baseline]
+
+
+def standings_of(runs: Runs) -> Standings | None:
+    """Return the standings of the methods of a ledger, None if no run has an error."""
+    contest = contest_of(runs)
+    if contest is None:
+        return None
+    return Standings(contest, leaderboard(contest), runs.kind.baselines(contest))
+
+
+def leaderboard(contest: Contest) -> list[Standing]:
     """Return a row for each method, best first.
 
     The order has three groups:
@@ -38,102 +107,71 @@ def leaderboard(contest: Contest) -> list[dict[str, Any]]:
        ahead of an equally good method that loses none.
     2. The other methods that take part, by their score.
     3. Methods that do not take part, with the averages of all their own runs.
-
-    Args:
-        contest: The methods and the runs that they share.
-
-    Returns:
-        The rows. A figure is the average over the method's runs, the score has an
-        interval, and `Kind.board` adds entries. `behind` is the mean difference from
-        the first method in paired runs, with its interval; `p` is the paired test's p
-        after Holm's correction; `blocks_needed` is how many paired runs would show such
-        a difference.
     """
-    runs = contest.runs
-    score = runs.kind.score
-    more = runs.kind.board(contest)
-    settings = runs.settings
-    board: list[dict[str, Any]] = []
-    for m, name in enumerate(runs.methods):
-        rows = contest.rows_of(m)
-        row = {
-            "method": m,
-            "name": name,
-            "settings": settings[m],
-            "runs": len(rows),
-            "failed": runs.failed[name],
-            "warned": sum(k in runs.warnings for k in rows.tolist()),
-            "taking_part": m in contest.methods,
-        }
-        for figure, column in runs.kind.columns.items():
-            row[figure] = column.average(runs.figures[figure][rows])
-        board.append({**row, **more[m]})
+    kind = contest.runs.kind
+    ends = dict[int, tuple[float, float]]()
+    for place, m in enumerate(contest.methods):
+        low, high = kind.interval(contest, place)
+        if math.isfinite(low):
+            ends[m] = low, high
 
-    def badness(row: dict[str, Any]) -> tuple[float, float]:
-        """Return a key that is lower for better rows; rows without a score are last."""
-        value = row[score.name]
+    def badness(m: int) -> tuple[float, float]:
+        """Return a key that is lower for better methods.
+
+        Those without a score are last.
+        """
+        value = figures[m][kind.score.name]
         if value is None:
             return math.inf, 0.0
-        return (-value if score.down else value), row.get("above", 0.0)
+        # of searches with equal shares of targets, the lower cost is better
+        return (-value if kind.score.down else value), figures[m].get("above") or 0.0
 
+    def order(m: int) -> tuple[Any, ...]:
+        worse = m not in contest.methods or m in worse_methods
+        lost = 0 if worse else contest.runs.lost_tracks(rows[m]) or 0
+        return m not in contest.methods, worse, lost, badness(m)
+
+    numbers = range(len(contest.runs.methods))
+    rows = [contest.rows_of(m) for m in numbers]
+    figures = [kind.figures(contest.runs, rows_of_method) for rows_of_method in rows]
     # the method of the best score comes first only if it lost no more than others that
     # a test does not separate from it
-    best = min((row for row in board if row["taking_part"]), key=badness)
-    best_place = contest.methods.index(best["method"])
+    best = min(contest.methods, key=badness)
     worse_methods = set()
-    for pair in contest.comparisons:
-        places = (pair.first, pair.second)
-        if best_place in places and pair.p_value < SIGNIFICANCE:
-            other = pair.second if pair.first == best_place else pair.first
-            worse_methods.add(contest.methods[other])
+    for m, test in contest.tests_against(best):
+        if test.p_value < SIGNIFICANCE:
+            worse_methods.add(m)
+    best_first = sorted(numbers, key=order)
+    effects = _effects(contest, best_first[0])
+    board = []
+    for m in best_first:
+        name = contest.runs.methods[m]
+        row = Standing(
+            method=m,
+            name=name,
+            settings=contest.runs.settings[m],
+            runs=len(rows[m]),
+            failed=contest.runs.failed[name],
+            warned=sum(k in contest.runs.warnings for k in rows[m].tolist()),
+            taking_part=m in contest.methods,
+            figures=figures[m],
+            interval=ends.get(m),
+            lost_tracks=contest.runs.lost_tracks(rows[m]),
+            effect=effects.get(m),
+        )
+        board.append(row)
+    return board
 
-    def order(row: dict[str, Any]) -> tuple[Any, ...]:
-        worse = not row["taking_part"] or row["method"] in worse_methods
-        lost = 0 if worse else row.get("lost_tracks", 0)
-        return not row["taking_part"], worse, lost, badness(row)
 
-    board.sort(key=order)
-    effects = _effects(contest, board[0]["method"])
-    return [{**row, **effects[row["method"]]} for row in board]
-
-
-def _effects(contest: Contest, first: int) -> dict[int, dict[str, float | None]]:
-    """Return the entries of `EFFECT` for each method, compared with the first.
-
-    They are None for a method without a test.
-    """
-    place = contest.methods.index(first)
-    effects: dict[int, dict[str, float | None]] = {}
-    for m in range(len(contest.runs.methods)):
-        effects[m] = dict.fromkeys(EFFECT)
-    for pair in contest.comparisons:
-        if place not in (pair.first, pair.second):
-            continue
-        # positive if the other method is worse
-        ends = (pair.difference, pair.low, pair.high)
-        if place == pair.first:
-            ends = (-pair.difference, -pair.high, -pair.low)
-        other = contest.methods[pair.first + pair.second - place]
-        numbers = (*ends, pair.adjusted, pair.blocks_needed)
-        effects[other] = dict(zip(EFFECT, numbers, strict=True))
+def _effects(contest: Contest, first: int) -> dict[int, Effect]:
+    """Return each tested method's distance from the first one."""
+    effects = {}
+    for m, test in contest.tests_against(first):
+        effects[m] = Effect(
+            behind=test.difference,
+            behind_low=test.low,
+            behind_high=test.high,
+            p=test.adjusted,
+            blocks_needed=test.blocks_needed,
+        )
     return effects
-
-
-def paired_tests_of(contest: Contest) -> dict[str, Any] | None:
-    """Return the paired tests of a contest, as the page needs them.
-
-    Args:
-        contest: The methods and the runs that they share.
-
-    Returns:
-        The methods, the number of blocks, and for each pair the fields of a
-        `posefit.statistics.paired.PairedTest`. A difference below 0 is in favour of the
-        first method. None if there are not two methods and two blocks.
-    """
-    if not contest.comparisons:
-        return None
-    return {
-        "methods": contest.methods,
-        "blocks": contest.tested_errors[0].size,
-        "pairs": [astuple(comparison) for comparison in contest.comparisons],
-    }

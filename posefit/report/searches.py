@@ -12,9 +12,9 @@ from posefit.evaluation.measures import Measure
 from posefit.reading import counted
 from posefit.report.charts import Chart, Line
 from posefit.report.columns import Column, Score, listed, median
-from posefit.report.contest import Contest, Place, Row, Runs
+from posefit.report.contest import Baseline, Contest, Indices, Place, Row, Runs
 from posefit.report.stored import Store
-from posefit.statistics.means import mean_intervals
+from posefit.statistics.means import mean_interval, mean_intervals
 from posefit.statistics.profiles import attained, hits
 from posefit.suites.functions import suite_function
 from posefit.suites.problem import TARGETS
@@ -44,14 +44,12 @@ COLUMNS = {
     "above": Column(_ABOVE, average=median),
 }
 SCORE = Score(
-    name="reached",
+    column=COLUMNS["reached"],
     title="targets %",
     axis="share of targets reached",
     sentence="reached {} of all targets",
     unit=" %",
     points=" points",
-    digits=1,
-    down=True,
     paired="instances",
     caption="Share of all runs and targets that a method reached, with the 95 % "
     "interval that other instances would give, if a function has several; a dashed "
@@ -69,12 +67,10 @@ class Searches:
     title = "Report of single searches"
     columns: Mapping[str, Column] = COLUMNS
     score = SCORE
-    named: tuple[str, ...] = ("function", "dimension", "instance")
     # a `SuiteRun`, and the result of `_hits`
     data: Mapping[str, Callable[[], Store]] = MappingProxyType(
         {"runs": list, "hits": list}
     )
-    baselines: Mapping[str, str] = {RANDOM: "random search"}
 
     def computed(self, row: Row, /) -> dict[str, float]:
         """Return the share of targets that a row reached, and its cost above."""
@@ -82,10 +78,11 @@ class Searches:
         reached = 100.0 * float(np.isfinite(_hits(run)).mean())
         return {"reached": reached, "above": run.cost - run.truth_cost}
 
-    def read(self, row: Row, /) -> tuple[Array, tuple[Any, ...]]:
+    def read(self, row: Row, /) -> tuple[Array, dict[str, Any]]:
         """Return the figures of a row, its run, and its evaluations to each target."""
         run = search_run(row)
-        return np.array(list(self.computed(row).values())), (run, _hits(run))
+        figures = np.array(list(self.computed(row).values()))
+        return figures, {"runs": run, "hits": _hits(run)}
 
     def rank(self, place: Place) -> tuple[Any, ...]:
         """Return the key by which instances are sorted."""
@@ -129,33 +126,26 @@ class Searches:
         means = sums / np.bincount(block)  # (methods, blocks)
         return np.asarray(means[:, :, None])
 
-    def board(self, contest: Contest) -> dict[int, dict[str, Any]]:
-        """Return the interval of each method's share of targets.
+    def figures(self, runs: Runs, rows: Indices) -> dict[str, float | None]:
+        """Return the averages of some rows."""
+        return runs.averages(rows)
 
-        It is the interval that other instances would give.
-        """
+    def interval(self, contest: Contest, place: int) -> tuple[float, float]:
+        """Return the ends of the interval that other instances would give."""
         functions = contest.place_field("function")
         instances = contest.place_field("instance")
-        board: dict[int, dict[str, Any]] = {}
-        for m, variant in enumerate(contest.runs.variants):
-            is_random = variant["method"] == RANDOM
-            board[m] = {"low": None, "high": None, "is_random": is_random}
-        means = mean_intervals(contest.scores, functions, instances)
-        for m, low, high in zip(contest.methods, means.low, means.high, strict=True):
-            if np.isfinite(low):
-                board[m]["low"] = max(float(low), 0.0)
-                board[m]["high"] = min(float(high), 100.0)
-        return board
+        mean = mean_interval(contest.scores[place], functions, instances)
+        return max(mean.low, 0.0), min(mean.high, 100.0)
 
-    def baseline_rows(self, contest: Contest) -> list[dict[str, Any]]:
-        """Return a row for random search, if it takes part: its best variant."""
+    def baselines(self, contest: Contest) -> list[Baseline]:
+        """Return random search, if it takes part: its best variant."""
         shares = []
         for m, shares_of_runs in zip(contest.methods, contest.scores, strict=True):
             if contest.runs.variants[m]["method"] == RANDOM:
                 shares.append(float(shares_of_runs.mean()))
         if not shares:
             return []
-        return [{"baseline": RANDOM, "reached": max(shares)}]
+        return [Baseline(RANDOM, "random search", {SCORE.name: max(shares)})]
 
     def place_words(self, contest: Contest) -> str:
         """Return the functions, dimensions and instances of a contest in words."""
@@ -170,23 +160,26 @@ class Searches:
         words += f" in {listed(dimensions, len(dimensions))} dimensions"
         return f"{words}, {counted(len(problems), 'instance')} in all"
 
-    def baseline_sentences(self, first: Row, baselines: Sequence[Row]) -> list[str]:
+    def baseline_sentences(
+        self, contest: Contest, first: int, baselines: Sequence[Baseline]
+    ) -> list[str]:
         """Return a sentence about the share of targets that random search reached."""
-        if first["is_random"]:
+        if contest.runs.variants[first]["method"] == RANDOM:
             return ["That is random search: no method does better."]
         sentences = []
-        for row in baselines:
-            text = SCORE.text(row["reached"])
-            sentences.append(f"Random search reached {text}.")
+        for baseline in baselines:
+            if (share := baseline.figures[SCORE.name]) is not None:
+                sentences.append(f"Random search reached {SCORE.text(share)}.")
         return sentences
 
     def page(self, _: Runs, contest: Contest | None, /) -> dict[str, Any]:
         """Return the curves, the running times and the list of sections."""
         if contest is None:
             return {"sections": []}
+        charts = search_charts(contest)
         return {
             "sections": ["leaderboard", "curves", "times"],
-            "charts": [chart.as_dict() for chart in search_charts(contest)],
+            "charts": [chart.as_dict() for chart in charts],
             "above": SHOWN,
             "times": running_times(contest),
         }

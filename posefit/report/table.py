@@ -4,10 +4,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from posefit.evaluation.measures import BASELINES
-from posefit.report.columns import Score
-from posefit.report.contest import Row, Runs
-from posefit.report.leaderboard import EFFECT
+from posefit.report.columns import LEAST_P, Score
+from posefit.report.leaderboard import EFFECT, Standing, Standings
 from posefit.report.tracks import LOSS_BASELINE
 
 LATEX_MARK = "% The leaderboard of a report of posefit; needs \\usepackage{booktabs}.\n"
@@ -23,51 +21,52 @@ _LATEX = {
 }
 
 
-def board_cells(score: Score, row: Row) -> dict[str, str]:
+def board_cells(score: Score, row: Standing) -> dict[str, str]:
     """Return the printed texts of a method's row, by the titles of the columns."""
 
-    def number(value: float | None, digits: int) -> str:
+    def number(value: float | None, digits: int = score.digits) -> str:
         return "-" if value is None else f"{value:z.{digits}f}"
 
     ends = "-"
-    if row["low"] is not None:
-        low = number(row["low"], score.digits)
-        high = number(row["high"], score.digits)
-        ends = f"{low} to {high}"
-    p = number(row["p"], 3)
-    if row["p"] is not None and row["p"] < 0.001:
-        p = "< 0.001"
+    if row.interval:
+        ends = " to ".join(map(number, row.interval))
+    behind = "-"
+    p = "-"
+    if row.effect:
+        behind = number(row.effect.behind)
+        p = number(row.effect.p, 3)
+        if row.effect.p < LEAST_P:
+            p = f"< {LEAST_P}"
     cells = {
-        score.title: number(row[score.name], score.digits),
+        score.title: number(row.figures[score.name]),
         "95 % interval": ends,
-        "behind": number(row["behind"], score.digits),
+        "behind": behind,
         "p": p,
     }
-    if "lost_tracks" not in row:
-        return {**cells, "above": number(row["above"], 2)}
-    lost = row["lost_rate"]
+    if row.lost_tracks is None:
+        return {**cells, "above": number(row.figures["above"], 2)}
+    lost = row.figures["lost_rate"]
     return {
         **cells,
-        "lost in": f"{row['lost_tracks']}/{row['runs']}",
+        "lost in": f"{row.lost_tracks}/{row.runs}",
         "lost %": "-" if lost is None else number(100.0 * lost, 1),
-        "skill": number(row[f"skill.{LOSS_BASELINE}"], 2),
+        "skill": number(row.figures[f"skill.{LOSS_BASELINE}"], 2),
     }
 
 
-def board_lines(
-    score: Score, board: Sequence[Row], baselines: Sequence[Row]
-) -> list[str]:
+def board_lines(standings: Standings) -> list[str]:
     """Return the lines of the printed leaderboard.
 
     The last line is the baseline with which skills compare.
     """
-    cells = [board_cells(score, row) for row in board]
-    names = [row["name"] for row in board]
-    for baseline in baselines:
-        is_shown = baseline["baseline"] == LOSS_BASELINE
-        if is_shown and baseline[score.name] is not None:
-            names.append(BASELINES[LOSS_BASELINE])
-            cells.append({score.title: f"{baseline[score.name]:.{score.digits}f}"})
+    score = standings.contest.runs.kind.score
+    cells = [board_cells(score, row) for row in standings.board]
+    names = [row.name for row in standings.board]
+    for baseline in standings.baselines:
+        value = baseline.figures[score.name]
+        if baseline.name == LOSS_BASELINE and value is not None:
+            names.append(baseline.title)
+            cells.append({score.title: f"{value:.{score.digits}f}"})
     widths = {}
     for title in cells[0]:
         lengths = [len(row.get(title, "")) for row in cells]
@@ -81,32 +80,34 @@ def board_lines(
     return lines
 
 
-def board_rows(runs: Runs, board: Sequence[Row]) -> list[dict[str, Any]]:
+def board_rows(standings: Standings) -> list[dict[str, Any]]:
     """Return the rows of the leaderboard's CSV file.
 
     They have every figure under its name, and all else that the page has of a method.
     """
-    score, *others = runs.table_figures
-    names = ["name", "settings", score, "low", "high", *EFFECT]
-    if "lost_tracks" in board[0]:
+    score, *others = standings.contest.runs.table_figures
+    names = ["settings", score, "low", "high", *EFFECT]
+    if standings.board[0].lost_tracks is not None:
         names.append("lost_tracks")
     names += ["runs", "failed", "warned", *others]
     rows = []
-    for row in board:
-        figures = {name: row[name] for name in names[1:]}
-        rows.append({"method": row["name"], **figures})
+    for row in standings.board:
+        values = row.as_dict()
+        figures = {name: values[name] for name in names}
+        rows.append({"method": row.name, **figures})
     return rows
 
 
-def latex_table(score: Score, board: Sequence[Row]) -> str:
+def latex_table(standings: Standings) -> str:
     """Return the leaderboard as a LaTeX table."""
-    cells = [board_cells(score, row) for row in board]
+    score = standings.contest.runs.kind.score
+    cells = [board_cells(score, row) for row in standings.board]
     columns = "l" + "r" * len(cells[0])
     lines = [f"\\begin{{tabular}}{{{columns}}}", "\\toprule"]
     lines.append(_latex_row(["method", *cells[0]]))
     lines.append("\\midrule")
-    for row, texts in zip(board, cells, strict=True):
-        lines.append(_latex_row([row["name"], *texts.values()]))
+    for row, texts in zip(standings.board, cells, strict=True):
+        lines.append(_latex_row([row.name, *texts.values()]))
     lines += ["\\bottomrule", "\\end{tabular}"]
     return LATEX_MARK + "\n".join(lines) + "\n"
 

@@ -5,12 +5,12 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import astuple, replace
+from operator import itemgetter
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.evaluation.measures import BASELINES, MEASURES, Measure
@@ -18,12 +18,10 @@ from posefit.fitting.metrics import skill
 from posefit.measuring.centres import PLACES
 from posefit.reading import counted
 from posefit.report import charts
-from posefit.report.columns import NAMED, Column, Score, listed, mean
-from posefit.report.contest import Contest, Place, Row, Runs
-from posefit.report.leaderboard import paired_tests_of
-from posefit.report.repeat import command_head
+from posefit.report.columns import NAMED, Column, Score, listed
+from posefit.report.contest import Baseline, Contest, Indices, Place, Row, Runs
 from posefit.report.stored import Packed, Store, Traces
-from posefit.statistics.means import block_means
+from posefit.sweep.repeat import END, TRACK_BEGIN, plan_lines, track_fields
 from posefit.sweep.table import damage, views
 from posefit.uncertainty.calibration import BINS
 
@@ -31,10 +29,6 @@ LOSS = "error_with_losses_degrees"
 LOSS_BASELINE = "mean_pose"  # a lost frame has at least the error of this baseline
 TABLE_LEVEL = "80"  # the level, in percent, of intervals in tables
 MAX_SEEDS = 50  # the most seeds that the facts list
-# A method that lost some tracks, but fewer than these, has no interval. So few losses
-# say little about their frequency: an interval would hold the truth in 86 to 92 % of
-# studies instead of 95 %.
-MIN_LOST = 3
 NO_MODES: Array = np.zeros((BINS, 3), dtype=np.float32)
 
 
@@ -114,17 +108,17 @@ def _columns() -> list[Column]:
         ]
     error = replace(MEASURES["error_degrees"], name="error_degrees.mean")
     return [
-        Column(loss),
+        Column(loss, brief=True),
         # only in rows and the CSV: a page with 100,000 rows has no room for it
         Column(error, in_tables=False),
         *skills,
-        Column(_share("lost_rate")),
+        Column(_share("lost_rate"), brief=True),
         Column(_share("swap_rate")),
         Column(_share("unknown_rate"), optional=True),
         *intervals,
         Column(MEASURES["mpjpe_mm"]),
         Column(MEASURES["iou"], higher_is_better=True),
-        Column(MEASURES["seconds_per_frame"]),
+        Column(MEASURES["seconds_per_frame"], brief=True),
         Column(MEASURES["cpu_seconds_per_frame"]),
         Column(replace(MEASURES["evaluations"], name="evaluations_used")),
         *baselines,
@@ -133,14 +127,12 @@ def _columns() -> list[Column]:
 
 COLUMNS = {column.name: column for column in _columns()}
 SCORE = Score(
-    name=LOSS,
+    column=COLUMNS[LOSS],
     title="error with losses",
     axis="error with losses in degrees",
     sentence="has an error with losses of {}",
     unit="°",
     points="°",
-    digits=2,
-    down=False,
     paired="runs",
     caption="Mean of a method's errors with losses: a lost frame counts at least "
     "as much as the mean training pose. "
@@ -165,26 +157,25 @@ class Tracks:
     title = "Report of a sweep"
     columns: Mapping[str, Column] = COLUMNS
     score = SCORE
-    named: tuple[str, ...] = ("motion", "view_degrees", "corruption", "instance")
     # errors of joints (27,) in mm; modes (bins, 3), see `_binned`; evaluations and
     # costs
     data: Mapping[str, Callable[[], Store]] = MappingProxyType(
         {"joint_errors": Packed, "modes": list, "traces": Traces}
     )
-    baselines: Mapping[str, str] = BASELINES
 
     def computed(self, row: Row, /) -> dict[str, float]:
         """Return the error with losses of a row."""
         return {LOSS: error_with_losses(row)}
 
-    def read(self, row: Row, /) -> tuple[Array, tuple[Any, ...]]:
+    def read(self, row: Row, /) -> tuple[Array, dict[str, Any]]:
         """Return the figures of a row and its other data."""
         used = np.array(row["trace"]["evaluations"], np.float32)
         trace = used, np.array(row["trace"]["cost"], np.float32)
         joints = np.array(row["joint_errors_mm"], dtype=np.float32)
         row = {**row, **self.computed(row)}
         figures = np.array([column.value(row) for column in COLUMNS.values()])
-        return figures, (joints, _binned(row["mode_reliability"]), trace)
+        modes = _binned(row["mode_reliability"])
+        return figures, {"joint_errors": joints, "modes": modes, "traces": trace}
 
     def rank(self, place: Place) -> tuple[Any, ...]:
         """Return the key by which instances are sorted: undamaged ones come first."""
@@ -234,50 +225,33 @@ class Tracks:
         """
         return contest.scores[:, :, None]
 
-    def board(self, contest: Contest) -> dict[int, dict[str, Any]]:
-        """Return each method's interval, skills, and number of tracks with losses.
+    def figures(self, runs: Runs, rows: Indices) -> dict[str, float | None]:
+        """Return the averages of some rows.
 
-        A skill is 1 - e / b with the method's error with losses e and the baseline's
-        error b on the same runs.
+        A skill is 1 - e / b with the error with losses e and the baseline's error b.
         """
-        figures = contest.runs.figures
-        intervals = block_means(contest.scores, contest.instance)
-        shared = {row["baseline"]: row[LOSS] for row in self.baseline_rows(contest)}
-        board: dict[int, dict[str, Any]] = {}
-        for m in range(len(contest.runs.methods)):
-            rows = contest.rows_of(m)
-            lost_tracks = int((figures["lost_rate"][rows] > 0.0).sum())
-            low = math.nan
-            high = math.nan
-            baselines = shared
-            if m not in contest.methods:
-                baselines = {}
-                for name in BASELINES:
-                    errors = figures[f"baselines_degrees.{name}"][rows]
-                    baselines[name] = mean(errors)
-            elif not 0 < lost_tracks < MIN_LOST:
-                place = contest.methods.index(m)
-                low = float(intervals.low[place])
-                high = float(intervals.high[place])
-            board[m] = {
-                "low": low if math.isfinite(low) else None,
-                "high": high if math.isfinite(high) else None,
-                "lost_tracks": lost_tracks,
-                **_skills(mean(figures[LOSS][rows]), baselines),
-            }
-        return board
-
-    def baseline_rows(self, contest: Contest) -> list[dict[str, Any]]:
-        """Return a row for each baseline, on the same runs as the methods."""
-        errors: dict[str, float | None] = {}
+        figures = runs.averages(rows)
         for name in BASELINES:
-            # (methods, blocks); the mean is over the methods that have a value
-            values = np.ma.masked_invalid(contest.of(f"baselines_degrees.{name}"))
-            errors[name] = mean(values.mean(axis=0).filled(np.nan))
-        rows = []
-        for name, error in errors.items():
-            rows.append({"baseline": name, LOSS: error, **_skills(error, errors)})
-        return rows
+            baseline = figures[f"baselines_degrees.{name}"]
+            figures[f"skill.{name}"] = _skill(figures[LOSS], baseline)
+        return figures
+
+    def interval(self, contest: Contest, place: int) -> tuple[float, float]:
+        """Return the ends of the interval of a method's mean error."""
+        means = contest.means(place, contest.scores[place : place + 1])
+        return float(means.low[0]), float(means.high[0])
+
+    def baselines(self, contest: Contest) -> list[Baseline]:
+        """Return the baselines, on the same runs as the methods."""
+        figures = contest.runs.averages(contest.blocks.ravel())
+        errors = {name: figures[f"baselines_degrees.{name}"] for name in BASELINES}
+        baselines = []
+        for name, title in BASELINES.items():
+            skills = {}
+            for other, error in errors.items():
+                skills[f"skill.{other}"] = _skill(errors[name], error)
+            baselines.append(Baseline(name, title, {LOSS: errors[name], **skills}))
+        return baselines
 
     def place_words(self, contest: Contest) -> str:
         """Return the instances of a contest in words: `4 instances of run and walk`."""
@@ -285,17 +259,21 @@ class Tracks:
         names = listed(motions) if len(motions) <= NAMED else f"{len(motions)} motions"
         return f"{counted(len(contest.instances), 'instance')} of {names}"
 
-    def baseline_sentences(self, first: Row, baselines: Sequence[Row]) -> list[str]:
+    def baseline_sentences(
+        self, contest: Contest, first: int, baselines: Sequence[Baseline]
+    ) -> list[str]:
         """Return a sentence that compares the best baseline with the first method."""
-        known = [row for row in baselines if row[LOSS] is not None]
-        if not known:
+        known = []
+        for baseline in baselines:
+            if (error := baseline.figures[LOSS]) is not None:
+                known.append((error, baseline.title))
+        own = contest.runs.averages(contest.rows_of(first))[LOSS]
+        if not known or own is None:
             return []
-        best = min(known, key=lambda row: float(row[LOSS]))
-        name = BASELINES[best["baseline"]]
-        value = f"{best[LOSS]:.2f}°"
-        if best[LOSS] > first[LOSS]:
-            return [f"The best baseline, the {name}, has {value}."]
-        return [f"It does not beat the baselines: the {name} has {value}."]
+        error, title = min(known, key=itemgetter(0))
+        if error > own:
+            return [f"The best baseline, the {title}, has {SCORE.text(error)}."]
+        return [f"It does not beat the baselines: the {title} has {SCORE.text(error)}."]
 
     def page(self, runs: Runs, contest: Contest | None, /) -> dict[str, Any]:
         """Return the charts, the joints, the uncertainty, the rows and the sections."""
@@ -311,19 +289,14 @@ class Tracks:
                 chart_sections.append("certainty")
             sections = [*chart_sections, *sections]
             part = {
-                "pairs": paired_tests_of(contest),
+                "pairs": _pairs(contest),
                 "charts": [chart.as_dict() for chart in charts.track_charts(contest)],
                 "joint_errors": [vars(intervals) for intervals in joints],
                 "certainty": certainty,
             }
-        instances = []
-        for name, place in zip(runs.instances, runs.places, strict=True):
-            instances.append({"name": name, "number": _exact(place["instance"])})
-        heads, head = _heads(runs)
         rows = {
             "method": runs.method,
             "instance": runs.instance,
-            "head": head,
             "seed": runs.seed,
             **{name: runs.figures[name] for name in runs.table_figures},
             "key": runs.keys.astype(str),
@@ -332,29 +305,32 @@ class Tracks:
             **part,
             "sections": sections,
             "joints": [place.replace("_", " ") for place in PLACES],
-            "instances": instances,
             "rows": rows,
-            "seeds": [_exact(seed) for seed in runs.seeds],
-            "heads": heads,
+            "seeds": [*map(str, runs.seeds)],
+            # a command that repeats a row consists of these, with its seed
+            "command": {
+                "begin": TRACK_BEGIN,
+                "methods": [plan_lines(track_fields(one)) for one in runs.variants],
+                "instances": [plan_lines(track_fields(one)) for one in runs.places],
+                "end": END,
+            },
         }
 
 
-def _heads(runs: Runs) -> tuple[list[str], NDArray[np.int64]]:
-    """Return the beginnings of the commands that run rows again, and each row's index.
+def _pairs(contest: Contest) -> dict[str, Any] | None:
+    """Return the paired tests of a contest, as the page needs them.
 
-    Rows that differ only in their last fields have the same beginning.
+    There are the methods, the number of blocks, and for each pair the fields of a
+    `posefit.statistics.paired.PairedTest`. The result is None if there are not two
+    methods and two blocks.
     """
-    # a number for each pair of a method and an instance
-    numbers = runs.method * len(runs.places) + runs.instance
-    pairs, pair_of_row = np.unique(numbers, return_inverse=True)
-    commands = []
-    for number in pairs.tolist():
-        m, i = divmod(number, len(runs.places))
-        commands.append(command_head({**runs.variants[m], **runs.places[i]}))
-    heads = sorted(set(commands))
-    index = {head: k for k, head in enumerate(heads)}
-    of_pairs = np.array([index[command] for command in commands], dtype=np.int64)
-    return heads, of_pairs[pair_of_row]
+    if not contest.comparisons:
+        return None
+    return {
+        "methods": contest.methods,
+        "blocks": contest.tested_errors[0].size,
+        "pairs": [astuple(comparison) for comparison in contest.comparisons],
+    }
 
 
 def _binned(modes: Sequence[Sequence[float]]) -> Array:
@@ -372,21 +348,11 @@ def _binned(modes: Sequence[Sequence[float]]) -> Array:
     return np.asarray(bins)
 
 
-def _skills(
-    error: float | None, baselines: Mapping[str, float | None]
-) -> dict[str, float | None]:
-    """Return the skill over each baseline, None if either error is unknown."""
-    skills: dict[str, float | None] = {}
-    for name, baseline in baselines.items():
-        skills[f"skill.{name}"] = None
-        if error is not None and baseline is not None:
-            skills[f"skill.{name}"] = skill(error, baseline)
-    return skills
-
-
-def _exact(number: int) -> int | str:
-    """Return a number that a browser can read exactly: as a text if it is too large."""
-    return number if abs(number) < 2**53 else str(number)
+def _skill(error: float | None, baseline: float | None) -> float | None:
+    """Return the skill over a baseline, None if either error is unknown."""
+    if error is None or baseline is None:
+        return None
+    return skill(error, baseline)
 
 
 TRACKS = Tracks()

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from posefit.errors import InputError
 from posefit.files import check_new, check_place, check_replaceable, replaced_file
@@ -11,15 +11,23 @@ from posefit.reading import cut
 from posefit.report.coco import write_coco
 from posefit.report.content import data_of
 from posefit.report.contest import Kind
+from posefit.report.leaderboard import standings_of
 from posefit.report.page import MARK, document
-from posefit.report.repeat import repeat_command
-from posefit.report.runs import KINDS, runs_of
+from posefit.report.reading import runs_of
 from posefit.report.table import LATEX_MARK, board_lines, latex_table
 from posefit.sweep.ledger import Ledger
+from posefit.sweep.repeat import repeat_command
 from posefit.sweep.table import flat, write_csv
 
 PRINTED = ("header", "answer", "leaderboard", "baselines", "times")
 CSV_MARK = "key,version,status,"  # how the CSV of a sweep begins
+
+
+class Report(NamedTuple):
+    """What the command `posefit report` prints: as lines, or as data."""
+
+    lines: list[str]
+    data: dict[str, Any]
 
 
 def write_report(
@@ -32,7 +40,7 @@ def write_report(
     coco: str | None = None,
     methods: Sequence[str] = (),
     latest: bool = False,
-) -> dict[str, Any]:
+) -> Report:
     """Write the report of a ledger, or of several together.
 
     Files of an earlier report are replaced. Other files never are.
@@ -49,8 +57,9 @@ def write_report(
         latest: Whether to compare only the latest version of each method.
 
     Returns:
-        The data that the command prints: the header, the answer, the leaderboard, the
-        baselines, and the running times of single searches.
+        What the command prints. The lines have the leader, the problems, the
+        leaderboard, and the path of the page. The data have the header, the answer, the
+        leaderboard, the baselines, and the running times of single searches.
 
     Raises:
         ValueError: The ledger has no finished row, or a file cannot be written. As far
@@ -83,50 +92,33 @@ def write_report(
                 "--coco must be given with a sweep of single searches, "
                 "got one of tracks"
             )
-        data = data_of(ledger, runs)
-        if latex is not None and "leaderboard" not in data:
-            raise InputError("--latex must be of runs with errors, got none")
+        standings = standings_of(runs)
+        for option, place in (("--figures", figures), ("--latex", latex)):
+            if place is not None and standings is None:
+                raise InputError(f"{option} must be of runs with errors, got none")
+        data = data_of(ledger, runs, standings)
         if out is not None:
             _write(out, MARK, document(data))
-        if figures is not None:
-            write_figures(runs, figures)
+        if figures is not None and standings is not None:
+            write_figures(standings, figures)
         if csv is not None:
             with replaced_file(csv, CSV_MARK.encode()) as building:
                 write_csv(_csv_rows(ledger, runs.kind), building)
         if coco is not None:
             write_coco(runs, coco)
-        if latex is not None:
-            text = latex_table(runs.kind.score, data["leaderboard"])
-            _write(latex, LATEX_MARK, [text])
-    return {
-        "out": out,
-        "kind": runs.kind.name,
-        **dict(plain({name: data[name] for name in PRINTED if name in data})),
-    }
-
-
-def leaderboard_lines(report: dict[str, Any]) -> list[str]:
-    """Return the lines that the command prints.
-
-    They have the leader, the problems, the leaderboard, and the path of the page.
-
-    Args:
-        report: The data that `write_report` returns.
-
-    Returns:
-        The lines.
-    """
+        if latex is not None and standings is not None:
+            _write(latex, LATEX_MARK, [latex_table(standings)])
     lines = []
-    if "leaderboard" in report:
-        lines += report["answer"]
-    for text, details in report["header"]["problems"]:
+    if standings is not None:
+        lines += data["answer"]
+    for text, details in data["header"]["problems"]:
         lines += [text, *(f"  {detail}" for detail in details)]
-    if "leaderboard" in report:
-        score = KINDS[report["kind"]].score
-        lines += board_lines(score, report["leaderboard"], report["baselines"])
-    if report["out"] is not None:
-        lines.append(f"written to {report['out']}: open it in any browser")
-    return lines
+    if standings is not None:
+        lines += board_lines(standings)
+    if out is not None:
+        lines.append(f"written to {out}: open it in any browser")
+    printed = plain({name: data[name] for name in PRINTED if name in data})
+    return Report(lines, {"out": out, "kind": runs.kind.name, **dict(printed)})
 
 
 def _write(path: str, mark: str, parts: Iterable[str]) -> None:

@@ -7,7 +7,7 @@ instance are not independent of each other: pass `errors.mean(axis=2, keepdims=T
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -47,6 +47,18 @@ class PairedTest:
     p_value: float
     adjusted: float
     blocks_needed: float
+
+    @property
+    def turned(self) -> "PairedTest":
+        """The same test with the second method first."""
+        return replace(
+            self,
+            first=self.second,
+            second=self.first,
+            difference=-self.difference,
+            low=-self.high,
+            high=-self.low,
+        )
 
 
 def paired_tests(errors: ArrayLike) -> list[PairedTest]:

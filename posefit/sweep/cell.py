@@ -64,7 +64,8 @@ class Cell:
 
     @property
     def _values(self) -> dict[str, Any]:
-        names = [field.name for field in fields(self)]  # type: ignore[arg-type]
+        # of a dataclass these are the names of its fields
+        names: tuple[str, ...] = self.__match_args__  # type: ignore[attr-defined]
         return {"kind": self.kind, **{name: getattr(self, name) for name in names}}
 
     @property

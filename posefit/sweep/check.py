@@ -6,7 +6,7 @@ other fields are checked here.
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from functools import lru_cache
 from math import inf
@@ -63,10 +63,7 @@ def cell_of(spec: Mapping[str, Any]) -> TrackCell:
         ValueError: A name is unknown or a value is invalid.
         ImportError: The method needs a library that is not installed.
     """
-    for name in ("method", "motion"):
-        if name not in spec:
-            raise InputError(f"a cell must have a {name}, got none")
-    values = _checked(spec, CHECKS)
+    values = _checked(spec, CHECKS, ("method", "motion"))
     texts = tuple(settings.settings_text(values.get("settings", {})))
     evaluations = values.get("evaluations", TrackCell.evaluations)
     chosen, version = _of_method(values["method"], texts, evaluations)
@@ -112,7 +109,8 @@ def search_of(spec: Mapping[str, Any]) -> SearchCell | None:
         ValueError: A name is unknown or a value is invalid.
         ImportError: The method needs a library that is not installed.
     """
-    values = _checked(spec, SEARCH_CHECKS)
+    required = ("method", "function", "dimension", "instance", "budget")
+    values = _checked(spec, SEARCH_CHECKS, required)
     dimension = values["dimension"]
     if dimension not in suite_function(values["function"]).dimensions:
         return None
@@ -159,11 +157,16 @@ def forget() -> None:
         cached.cache_clear()
 
 
-def _checked(spec: Mapping[str, Any], checks: "Checks") -> dict[str, Any]:
+def _checked(
+    spec: Mapping[str, Any], checks: "Checks", required: Iterable[str]
+) -> dict[str, Any]:
     """Return the fields of a cell after checking each one separately.
 
-    Raises InputError if a name is unknown or a value is invalid.
+    Raises InputError if a name is unknown or missing, or a value is invalid.
     """
+    for name in required:
+        if name not in spec:
+            raise InputError(f"a cell must have a {name}, got none")
     for name in spec:
         if name not in checks:
             raise InputError(

@@ -14,9 +14,11 @@ from posefit.silhouette.sharing import cores
 from posefit.sweep.cell import Cell, other_version, run_cell
 from posefit.sweep.drive import Tally, drive
 from posefit.sweep.engine import Engine, Limits
-from posefit.sweep.ledger import FILE, Ledger, Writer
+from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import MAX_CELLS
 from posefit.sweep.pool import Pool
+from posefit.sweep.schema import FILE
+from posefit.sweep.writer import Writer
 
 SHARDS = "ledger-*-of-*.sqlite"  # matches the names that `file_of` returns
 

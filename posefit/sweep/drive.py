@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from posefit.errors import InputError
 from posefit.sweep.cell import foreign_plugins
 from posefit.sweep.engine import POLL_SECONDS, Engine, Outcome
-from posefit.sweep.ledger import Writer
+from posefit.sweep.writer import Writer
 
 
 @dataclass

@@ -19,7 +19,7 @@ from typing import Any, Self
 from posefit.errors import InputError
 from posefit.motion.instances import HELD_OUT
 from posefit.reading import SHOWN, cut, parsed_toml, quoted, read_text, suggestion
-from posefit.suites.functions import FUNCTIONS
+from posefit.suites.functions import FUNCTIONS, suite_function
 from posefit.suites.problem import EVALUATIONS
 from posefit.sweep.cell import Cell
 from posefit.sweep.check import (
@@ -171,14 +171,7 @@ def _tracks(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
     lists = {}
     for name, values in crossed.items():
         lists[LISTS[name]] = _listed(f"product.{name}", LISTS[name], values)
-    said: set[str] = set()
-    for field, entries in lists.items():
-        names = set[str]().union(*(_fields(field, entry) for entry in entries))
-        if names & said:
-            raise InputError(
-                f"product must set {min(names & said)} in one list, got it in two"
-            )
-        said |= names
+    _check_fields(lists)
     if "methods" in crossed:
         # A product varies its last list fastest. With the methods last, an unfinished
         # sweep has all methods on the cases that are done.
@@ -257,7 +250,8 @@ def _with_methods(crossed: Mapping[str, Any]) -> dict[str, Any]:
 def _searches(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
     """Return a function that makes the cells of a plan of searches.
 
-    A function has no cells in dimensions in which it does not exist.
+    A function has no cells in dimensions in which it does not exist. Raises InputError
+    if that leaves a function that the plan names without any.
     """
     _check_names(
         "a plan of a suite", tables, ("suite", *SEARCH_LISTS, "infeasible", "grid")
@@ -274,13 +268,23 @@ def _searches(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
         lambda method: (method.partition(":")[0],),
     )
     lists["method"] = list(map(search_method, methods))
+    _check_fields(lists)
     _check_count(lists)
 
     def cells() -> Iterator[Cell]:
+        found = set()
         for spec in _product(lists):
             cell = search_of({**shared, **spec})
             if cell is not None:
+                found.add(cell.function)
                 yield cell
+        for entry in tables.get("functions", ()):
+            number = suite_function(_fields("function", entry)["function"]).number
+            if number not in found:
+                raise InputError(
+                    "functions must exist in one of the plan's dimensions, "
+                    f"got {number}, which exists in none of them"
+                )
 
     return cells
 
@@ -389,6 +393,18 @@ def _check_names(
                 f"{what} must hold {', '.join(known)}, "
                 f"got {quoted(name)}{suggestion(name, known)}"
             )
+
+
+def _check_fields(lists: Mapping[str, Sequence[Any]]) -> None:
+    """Raise InputError if two lists set the same field."""
+    said: set[str] = set()
+    for field, entries in lists.items():
+        names = set[str]().union(*(_fields(field, entry) for entry in entries))
+        if names & said:
+            raise InputError(
+                f"a product must set {min(names & said)} in one list, got it in two"
+            )
+        said |= names
 
 
 def _check_count(lists: Mapping[str, Sequence[Any]]) -> None:

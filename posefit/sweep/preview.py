@@ -22,10 +22,7 @@ from posefit.sweep.plan import Plan
 from posefit.sweep.pool import Pool
 
 VALUES = 12  # the most values of a field that a preview lists
-# Frames of the two short runs of a method. The difference of their times is the time of
-# three frames; the rest is the time of learning.
-SHORT = 1
-LONGER = 4
+FRAMES = 4  # of the short run of a method
 
 
 class Preview(NamedTuple):
@@ -121,25 +118,21 @@ def _value_lines(counts: Mapping[str, Counter[str]]) -> list[str]:
 def _seconds_of(cells: Sequence[Cell], pool: Pool) -> float:
     """Return about how many seconds one method's cells take.
 
-    The estimate is from two short runs of the first one, or from the whole of it if it
-    is a search. Raises InputError if a run fails.
+    The estimate is from a few frames of the first one, or from the whole of it if it is
+    a search. Raises InputError if it fails.
     """
     first = cells[0]
     amount = sum(map(_amount, cells))
-    if not isinstance(first, TrackCell):
-        return _seconds(first, pool) / _amount(first) * amount
-    short = replace(first, frames=SHORT)
-    # a motion may be shorter
-    longer = replace(first, frames=min(first.frames, LONGER))
-    _seconds(longer, pool)  # imports and compiles
-    of_longer = _seconds(longer, pool)
-    more = _amount(longer) - _amount(short)
-    if not more:
-        return of_longer * len(cells)
-    of_short = _seconds(short, pool)
-    slope = max((of_longer - of_short) / more, 0.0)
-    fixed = max(of_short - slope * _amount(short), 0.0)
-    return fixed * len(cells) + slope * amount
+    if isinstance(first, TrackCell):
+        # a motion may be shorter
+        first = replace(first, frames=min(first.frames, FRAMES))
+        _row(first, pool)  # imports and compiles
+    row = _row(first, pool)
+    searching = row["seconds"]
+    if isinstance(first, TrackCell):
+        searching = first.frames * row["seconds_per_frame"]
+    learning = row["seconds"] - searching
+    return float(learning * len(cells) + searching / _amount(first) * amount)
 
 
 def _amount(cell: Cell) -> float:
@@ -148,8 +141,8 @@ def _amount(cell: Cell) -> float:
     return float(cell.total_evaluations * views)
 
 
-def _seconds(cell: Cell, pool: Pool) -> float:
-    """Return how long a cell takes. Raises InputError naming its method if it fails."""
+def _row(cell: Cell, pool: Pool) -> dict[str, Any]:
+    """Return the row of a cell. Raises InputError naming its method if it fails."""
     pool.submit(cell, foreign_plugins(cell.version))
     outcomes: list[Outcome] = []
     while not outcomes:
@@ -160,4 +153,5 @@ def _seconds(cell: Cell, pool: Pool) -> float:
         method = f"{cell.method} with {settings}" if settings else cell.method
         where = "first frames" if isinstance(cell, TrackCell) else "first search"
         raise InputError(f"{method} fails in its {where}: {outcome.reason}")
-    return float(outcome.result["seconds"])
+    row: dict[str, Any] = outcome.result
+    return row

@@ -108,7 +108,8 @@ def test_track_writes_a_folder_that_can_be_opened_again(tmp_path: Path) -> None:
         ),
         (
             ["walk", "--camera", out / "poses.npz"],
-            "a calibration of the camera, got a file of masks",
+            "got arrays: a calibration is a text, as json.dump({name: array.tolist() for "
+            "name, array in numpy.load(FILE).items()}, ...) writes it",
         ),
     ):
         assert error_of("track", *words).endswith(message)

@@ -20,8 +20,8 @@ from posefit.geometry.skeleton import JOINTS
 from posefit.measuring.angles import COLUMNS
 from posefit.measuring.centres import PLACES
 from posefit.registry import registry
-from posefit.report.leaderboard import contest_of, leaderboard
-from posefit.report.runs import runs_of
+from posefit.report.leaderboard import standings_of
+from posefit.report.reading import runs_of
 from posefit.report.table import board_rows
 from posefit.report.write import write_report
 from posefit.silhouette.corruption import CORRUPTIONS
@@ -118,12 +118,14 @@ def test_every_column_of_a_leaderboard_is_described(tmp_path: Path) -> None:
     made = [result(replace(FIRST, method=m), 1.0) for m in "ab"]
     path = ledger(tmp_path / "results", made)
     with Ledger(path) as opened:
-        runs = runs_of(opened)
-    contest = contest_of(runs)
-    assert contest is not None
-    columns = set(board_rows(runs, leaderboard(contest))[0])
+        standings = standings_of(runs_of(opened))
+    assert standings is not None
+    columns = set(board_rows(standings)[0])
     described = columns_of(figures.page(), "`leaderboard.csv`")
-    assert columns - {"method", "settings", *runs.table_figures} == described
+    assert (
+        columns - {"method", "settings", *standings.contest.runs.table_figures}
+        == described
+    )
 
 
 def test_every_angle_is_described(tracked: Path) -> None:

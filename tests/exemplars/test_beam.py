@@ -15,11 +15,11 @@ from posefit_exemplars.cost_model import (
     root_deviation_costs,
     squared_distances,
 )
-from posefit_exemplars.exemplars import Exemplars, about_vertical
-from posefit_exemplars.proposals import (
-    CANDIDATE_TURNS,
-    next_states,
+from posefit_exemplars.exemplars import (
+    Exemplars,
+    about_vertical,
 )
+from posefit_exemplars.proposals import CANDIDATE_TURNS, next_states
 
 SECONDS = 1.0 / 30.0
 STEP = Step(SECONDS, 0.03, np.radians(8.0))
@@ -71,7 +71,7 @@ def test_next_states_are_those_of_the_slow_twin(small: Exemplars) -> None:
     for key, total in totals.items():
         assert total == pytest.approx(twin[key], rel=1e-4, abs=1e-3)
     assert min(totals.values()) == pytest.approx(min(twin.values()), abs=1e-3)
-    highest = before.totals.min() + JUMP_COST + 0.5 * 2.0**2
+    highest = before.totals.min() + JUMP_COST + 0.5 * max(CANDIDATE_TURNS) ** 2
     assert beams.totals.max() < highest
     for row in range(3):  # the next pose of each clip is among them
         assert (

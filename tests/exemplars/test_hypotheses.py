@@ -16,7 +16,7 @@ from posefit_exemplars.cost_model import (
 )
 from posefit_exemplars.estimate import Estimate
 from posefit_exemplars.frame_costs import FrameCosts
-from posefit_exemplars.hypotheses import Hypotheses
+from posefit_exemplars.hypotheses import SAME_DISTANCE, Hypotheses
 from posefit_exemplars.proposals import Counts
 from posefit_exemplars.tracker import ExemplarTracker
 from tests.cases import each
@@ -121,8 +121,9 @@ def test_the_right_one_of_two_hypotheses_is_reported_even_where_the_path_is_turn
 def test_fewer_hypotheses_are_the_same_the_more_cameras_there_are() -> None:
     walk = walk_of(built_in.motion("walk-a", frames=2), (0.0, 90.0))
     joints = np.zeros((3, len(JOINTS), 3))
-    joints[1] += 0.005 / np.sqrt(3.0)  # half a centimetre from the first
-    joints[2] += 0.02 / np.sqrt(3.0)
+    # a fifth of the distance of the same pose from the first, and three fifths
+    joints[1] += 0.2 * SAME_DISTANCE / np.sqrt(3.0)
+    joints[2] += 0.6 * SAME_DISTANCE / np.sqrt(3.0)
     still = np.zeros((3, 66))
     hypotheses = Hypotheses(still, still[:, :3], joints, still, still[:, :3], joints)
     totals = np.array([0.0, 1.0, 2.0])

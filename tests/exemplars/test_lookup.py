@@ -12,7 +12,8 @@ from posefit.arrays import Array
 from posefit.fitting.start import modes_apart
 from posefit.geometry.rotation import wrapped
 from posefit.motion import built_in
-from posefit_exemplars.lookup import YAW_STEP, Lookup, looking_at
+from posefit_exemplars.exemplars import SAME_TURN
+from posefit_exemplars.lookup import Lookup, looking_at
 from tests.cases import each
 from tests.geometry.turns import about
 
@@ -91,7 +92,7 @@ def test_a_known_yaw_leaves_out_the_others() -> None:
         assert (
             posterior is None
             or np.abs(wrapped(posterior.poses[:, 0] - yaw)).max()
-            < np.radians(50.0) + YAW_STEP
+            < np.radians(50.0) + SAME_TURN
         )
 
 

@@ -11,13 +11,11 @@ from posefit import Frame, mirrored_poses
 from posefit.uncertainty.modes import Posterior, unknown_sides
 from posefit_exemplars.lost_model import (
     EVIDENCE,
-    MAX_SPEED,
     MEAN_SECONDS,
     EvidenceMeans,
     FailureClassifier,
     LogisticModel,
     evidence_of,
-    root_motion,
     with_failure_probabilities,
 )
 from tests.cases import each
@@ -47,11 +45,11 @@ def frame_of(walker: Walk) -> Frame:
 
 def test_features_are_evidence_and_its_means_and_missing_evidence_is_the_last() -> None:
     memory = EvidenceMeans(30.0)
-    at = [*EVIDENCE].index("speed")
+    at = [*EVIDENCE].index("second")
     rows = [k * len(EVIDENCE) + at for k in range(3)]
-    first = memory.features({"speed": 1.0})
+    first = memory.features({"second": 1.0})
     assert first[rows].tolist() == [1.0, 1.0, 1.0]
-    memory.features({"speed": 0.0})
+    memory.features({"second": 0.0})
     third = memory.features({})
     shares = [math.exp(-1.0 / (30.0 * seconds)) for seconds in MEAN_SECONDS.values()]
     # older frames count less
@@ -64,11 +62,11 @@ def test_features_are_evidence_and_its_means_and_missing_evidence_is_the_last() 
 def test_evidence_of_a_frame(walker: Walk) -> None:
     skeleton = walker.motion.skeleton
     evidence = evidence_of(skeleton, frame_of(walker), walker.task.cameras)
-    # the cheapest reflected and the mirrored one: (6 + 1) / (4 + 1) and (7 + 1) / (4 + 1)
+    # the cheapest reflected and the mirrored one, on the scale log(cost + 1)
     expected = {
         "cost": 4.0,
-        "reflected": 1.4,
-        "mirrored": 1.6,
+        "reflected": math.log(7.0 / 5.0),
+        "mirrored": math.log(8.0 / 5.0),
         "second": 0.25,
         "views": 1.0,
     }
@@ -91,25 +89,6 @@ def test_cameras_that_show_nothing_do_not_count_and_more_than_four_count_as_four
         )
         evidence.append((values["views"], values["across"] > 0.0))
     assert evidence == [(1.0, True), (2.0, False), (4.0, False), (4.0, False)]
-
-
-def test_the_roots_motion_is_its_speed_and_the_speed_along_its_heading() -> None:
-    places = [
-        np.array([0.0, 0.9, 0.0]),
-        np.array([0.01, 0.9, 0.03]),
-        np.array([0.03, 0.8, 0.04]),
-    ]
-    # 3 and 4 centimetres in two thirtieths of a second
-    assert root_motion(places, 0.0, 30.0) == pytest.approx(
-        {"ahead": 0.6, "speed": 0.75}
-    )
-    assert root_motion(places[::-1], 0.0, 30.0, backwards=True) == pytest.approx(
-        {"ahead": 0.6, "speed": 0.75}
-    )
-    assert root_motion(places, np.pi, 30.0)["ahead"] == pytest.approx(-0.6)
-    assert root_motion(places, np.pi / 2.0, 30.0)["ahead"] == pytest.approx(0.45)
-    assert root_motion(places, 0.0, 300.0) == {"ahead": MAX_SPEED, "speed": MAX_SPEED}
-    assert root_motion(places[:1], 0.0, 30.0) == {}
 
 
 @each(("least", "unknown"), [(0.4, True), (0.6, False)])
@@ -156,7 +135,6 @@ def test_evidence_of_a_track(walker: Walk) -> None:
         return [set(frame.details["evidence"]) for frame in frames]
 
     first, *others = names(walker.hidden(4, 6).track(0, 6, evaluations=2440))
-    motion = {"ahead", "speed"}
     fit = {"cost", "reflected", "mirrored"}
-    assert first == EVIDENCE.keys() - motion
+    assert first == EVIDENCE.keys()
     assert others == [EVIDENCE.keys()] * 3 + [EVIDENCE.keys() - fit] * 2

@@ -131,6 +131,54 @@ def test_the_people_of_each_image_are_its_mask(walk: list[Any], tmp_path: Path) 
     assert any("the category person" in guess for guess in view.guesses)
 
 
+def test_a_crowd_is_unknown_beside_people_and_else_a_person(
+    walk: list[Any], tmp_path: Path
+) -> None:
+    crowd = np.zeros_like(walk[0])
+    crowd[40:, 20:] = True
+    content = document([[runs_of(mask), runs_of(crowd)] for mask in walk])
+    # some programs mark every run of pixels so, and the last image has nothing else
+    for k, each in enumerate(content["annotations"]):
+        each["iscrowd"] = k % 2
+    del content["annotations"][2 * len(walk) - 2]
+    view = read_masks(written(tmp_path / "a.json", content))
+    for k, mask in enumerate(walk):
+        silhouette = view.silhouette(k)
+        last = k == len(walk) - 1
+        np.testing.assert_array_equal(silhouette.mask, crowd if last else mask)
+        np.testing.assert_array_equal(silhouette.valid, mask | ~crowd | last)
+    assert any("marked iscrowd is unknown" in guess for guess in view.guesses)
+
+
+def test_annotations_of_no_image_are_said(walk: list[Any], tmp_path: Path) -> None:
+    content = document([[runs_of(mask)] for mask in walk])
+    content["images"] = content["images"][2:]
+    (warning,) = read_masks(written(tmp_path / "a.json", content)).warnings
+    assert f"2 of {len(walk)} annotated images" in warning
+    for each in content["annotations"]:
+        each["image_id"] = str(each["image_id"])
+    content["images"] = content["images"][:1]
+    content["images"][0]["id"] = 1
+    with pytest.raises(InputError, match="got '7' where images have 1"):
+        read_masks(written(tmp_path / "a.json", content))
+
+
+def test_whole_numbers_may_be_written_with_a_point(
+    walk: list[Any], tmp_path: Path
+) -> None:
+    content = document([[runs_of(mask)] for mask in walk])
+    for image in content["images"]:
+        for key in ("id", "width", "height"):
+            image[key] = float(image[key])
+    for each in content["annotations"]:
+        each["category_id"] = float(each["category_id"])
+    # a program that merges sets lists a category twice
+    content["categories"].append({"id": 9, "name": "person"})
+    view = read_masks(written(tmp_path / "a.json", content))
+    for k, mask in enumerate(walk):
+        np.testing.assert_array_equal(view.silhouette(k).mask, mask)
+
+
 def test_another_category_is_chosen_by_name(walk: list[Any], tmp_path: Path) -> None:
     path = written(tmp_path / "a.json", document([[runs_of(mask)] for mask in walk]))
     scene = scene_of([path], SourceOptions(category="person"))
@@ -169,6 +217,23 @@ GOOD = {"size": [HEIGHT, WIDTH], "counts": [WIDTH * HEIGHT]}
         (document([[{**GOOD, "size": [3, 4]}]]), "polygons or runs of pixels"),
         (document([[None]]), "polygons or runs of pixels"),
         (document([[GOOD], [GOOD]], ["a.jpg", "a.jpg"]), "each image once"),
+        (
+            document([[[[0.1, 0.1, 0.5, 0.1, 0.5, 0.9]]]]),
+            "polygons in pixels, got corners up to 0.9",
+        ),
+        (
+            {**document([[GOOD]]), "images": 2 * [document([[GOOD]])["images"][0]]},
+            "each image once",
+        ),
+        (
+            {
+                **document([[GOOD], [GOOD]]),
+                "images": [
+                    {**image, "id": 7} for image in document([[GOOD], [GOOD]])["images"]
+                ],
+            },
+            "images with an id each, got 7 for 2 images",
+        ),
     ],
 )
 def test_wrong_annotations_leave_one_line(

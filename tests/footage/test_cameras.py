@@ -349,7 +349,10 @@ def _named(name: str) -> Calibration:
 def test_cameras_go_with_the_sources_of_their_names_or_else_in_order(
     sources: list[str], cameras: list[str], order: list[int]
 ) -> None:
-    known = [_named(name) for name in cameras]
+    known = [
+        replace(_named(name), translation=np.full(3, float(k)))
+        for k, name in enumerate(cameras)
+    ]
     assert order_by_name(known, sources) == order
     paired = calibrated(known, [None] * len(known), sources)
     assert [each.name for each in paired] == [cameras[k] for k in order]

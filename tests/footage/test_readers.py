@@ -178,6 +178,23 @@ def test_the_meaning_of_numbers_in_names_is_reported(
             ["img_3.png", "img_4.png", "mask_3.png"],
             "expected one image a frame, got img_3.png and mask_3.png",
         ),
+        (
+            ["0.png", "1.png", "2.png", "preview.png"],
+            "a number in the name of every image, got preview.png",
+        ),
+        # two objects in each frame, the second of which comes later
+        (
+            ["0_1.png", "1_1.png", "2_1.png", "2_2.png", "3_1.png", "3_2.png"],
+            "expected one image a frame, got 2_1.png and 2_2.png",
+        ),
+        (
+            [f"cam{k}_{frame:03d}.png" for k in (1, 2) for frame in range(3)],
+            "expected one image a frame, got cam1_000.png and cam2_000.png",
+        ),
+        (
+            [f"{frame:03d}_obj{k}.png" for frame in range(2) for k in range(9)],
+            "expected one image a frame, got 000_obj0.png and 000_obj1.png",
+        ),
     ],
 )
 def test_other_pictures_with_masks_are_refused(
@@ -187,6 +204,53 @@ def test_other_pictures_with_masks_are_refused(
         drawn(walk)[0].save(tmp_path / name)
     with pytest.raises(ValueError, match=message):
         read_masks(tmp_path, ALL)
+
+
+@each("suffix", [".png", ".jpg", ".webp"])
+def test_images_that_are_to_be_turned_are_turned(
+    walk: list[Any], tmp_path: Path, suffix: str
+) -> None:
+    turned = Image.Exif()
+    turned[0x0112] = 6  # a quarter to the right
+    options = {"lossless": True} if suffix == ".webp" else {}
+    for k, mask in enumerate(walk):
+        image = drawn([np.rot90(mask)])[0]
+        image.save(tmp_path / f"{k}{suffix}", exif=turned, **options)
+    view = read_masks(tmp_path, ALL)
+    for k, mask in enumerate(walk):
+        shown = view.silhouette(k).mask
+        assert shown.shape == mask.shape
+        assert (shown != mask).mean() < (1e-3 if suffix == ".jpg" else 1e-9)
+
+
+def test_images_of_two_folders_are_not_one_camera(
+    walk: list[Any], tmp_path: Path
+) -> None:
+    files = []
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        for k, image in enumerate(drawn(walk)):
+            image.save(tmp_path / folder / f"f{k}.png")
+            files.append(tmp_path / folder / f"f{k}.png")
+    with pytest.raises(ValueError, match="f0.png; give the folder of each camera"):
+        read_masks(files, ALL)
+    # parts of one film, whose numbers go on
+    part = [files[0], files[1], *files[len(walk) + 2 :]]
+    assert len(read_masks(part, ALL)) == len(walk)
+
+
+@each(
+    "names",
+    [
+        # seconds and hundredths, or minutes, seconds and thousandths
+        [f"{k // 25}.{4 * (k % 25):02d}.png" for k in range(100)],
+        [f"{k // 1500}_{k // 25 % 60:02d}_{40 * (k % 25):03d}.png" for k in range(90)],
+    ],
+)
+def test_times_in_names_are_one_image_a_frame(names: list[str]) -> None:
+    assert numbered([Path(name) for name in names], "masks").files == [
+        Path(name) for name in names
+    ]
 
 
 def test_a_photo_among_jpegs_is_refused_by_name(
@@ -271,7 +335,8 @@ def test_the_only_array_of_a_file_is_the_masks(walk: list[Any], tmp_path: Path) 
         check(tmp_path / name, walk)
     np.savez(tmp_path / "c.npz", np.stack(walk), np.stack(walk))
     with pytest.raises(
-        ValueError, match="c.npz: expected an .npz file with the key masks, got none"
+        ValueError,
+        match="c.npz: expected an .npz file with the key masks, got 'arr_0', 'arr_1'$",
     ):
         read_masks(tmp_path / "c.npz", ALL)
 

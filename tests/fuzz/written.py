@@ -15,7 +15,8 @@ import numpy as np
 from posefit.fitting.tracker import Frame
 from posefit.output.folder import OutputFolder
 from posefit.output.identity import digest_of
-from posefit.sweep.ledger import FILE, NAMES, Writer
+from posefit.sweep.schema import FILE
+from posefit.sweep.writer import NAMES, Writer
 from posefit.uncertainty.modes import Posterior
 from tests.report.browser import result
 from tests.report.searched import cell as search_cell
@@ -76,7 +77,7 @@ def mended(content: bytes) -> bytes:
 def readers() -> dict[str, Callable[[Path], object]]:
     """Return what reads each kind of content; all messages must be clean."""
 
-    from posefit.report.write import leaderboard_lines, write_report
+    from posefit.report.write import write_report
     from posefit.sweep.ledger import Ledger
 
     def reported(file: Path) -> object:
@@ -84,7 +85,7 @@ def readers() -> dict[str, Callable[[Path], object]]:
         summary = write_report(str(file), f"{out}.html", csv=f"{out}.csv")
         with Ledger(file) as ledger:
             ledger.frame()
-        return leaderboard_lines(summary)
+        return summary.lines
 
     def whole(path: Path) -> object:
         file = path.with_name(f"{NAME}.sqlite")

@@ -135,6 +135,16 @@ def test_qualisys_third_radial_number_is_opencvs_fifth(tmp_path: Path) -> None:
             TOML.replace("[ 0.1, 0.0, 0.0, 0.0]", "[ 0.1, 0.0, 0.0]"),
             "a distortion of 3 numbers",
         ),
+        (
+            "a.json",
+            json.dumps({"K": K, "R": np.eye(3).tolist(), "C": [0.0, 1.0, 2.0]}),
+            "a rotation without a translation, such as rvec and tvec",
+        ),
+        ("a.json", json.dumps({"Camera.fx": 500.0}), "got none among 'Camera.fx'"),
+        ("a.json", "// a note\n{}", "broken JSON: "),
+        ("a.conf", "[LEFT_CAM_HD]\nfx=500\n", "another file, .conf; YAML, XML, JSON"),
+        ("cameras.txt", "1 PINHOLE 640 480 500", "another file, .txt; YAML, XML"),
+        ("a.json", json.dumps({"K": K, "time_offset": 0.1}), "the key 'time_offset'"),
         ("a.xml", "<calibration>", "broken XML"),
         ("a.xml", "<!DOCTYPE a [<!ENTITY b 'c'>]><calibration/>", "document type"),
         ("a.xml", QUALISYS.replace("intrinsic", "lens"), "a camera without intrinsic"),
@@ -151,7 +161,7 @@ def test_qualisys_third_radial_number_is_opencvs_fifth(tmp_path: Path) -> None:
         (
             "a.yml",
             "%YAML:1.0\n---\nimage_width: 3\n",
-            "without camera_matrix, image_width and image_height",
+            "the keys 'image_width' of 'a', but no camera matrix, and no fx, fy, cx and cy",
         ),
     ],
 )

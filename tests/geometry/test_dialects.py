@@ -121,6 +121,73 @@ def test_a_key_that_a_program_does_not_write_is_refused_by_name(
     assert repr(key) in message
 
 
+@each("angle", [40.0, 0.0, -0.5, 3.2])
+def test_an_angle_of_view_is_less_than_half_a_turn(
+    tmp_path: Path, angle: float
+) -> None:
+    values = json.loads(programs.nerf(camera_angle_x=angle))
+    del values["fl_x"], values["fl_y"]
+    assert f"a camera_angle_x of {angle:g}" in refused(tmp_path, json.dumps(values))
+
+
+@each("order", [1, -1])
+def test_metashapes_initial_calibration_is_not_the_adjusted_one(
+    tmp_path: Path, order: int
+) -> None:
+    text = programs.metashape()
+    start, end = text.index("<calibration"), text.index("</calibration>")
+    adjusted = text[start:end] + "</calibration>"
+    initial = adjusted.replace("adjusted", "initial").replace("500", "900")
+    both = "".join([initial, adjusted][::order])
+    one = one_of(tmp_path, text.replace(adjusted, both), ".xml")
+    np.testing.assert_allclose(np.diag(one.matrix), [500.0, 500.0, 1.0])
+    turned = text.replace("</transform>", "</transform><orientation>6</orientation>", 1)
+    assert "'orientation' of 'left'" in refused(tmp_path, turned, ".xml")
+
+
+@each("key", ["ORIENTATION", "POSITION", "PRINCIPAL_POINT", "FOCAL_LENGTH"])
+def test_what_a_vicon_camera_lacks_is_named(tmp_path: Path, key: str) -> None:
+    text = programs.vicon().replace(f" {key}=", f" {key}_ID=")
+    assert f"the camera 'left' without {key}" in refused(tmp_path, text, ".xcp")
+
+
+# a program by whose files no text is taken for a model of the lens
+@each("program", sorted({*SAMPLES} - {"Vicon", "Metashape"}))
+@each("model", ["fisheye", "SIMPLE_RADIAL_FISHEYE", "Fisheye624", "omni"])
+def test_a_lens_model_under_an_unknown_key_is_read_or_refused(
+    tmp_path: Path, program: str, model: str
+) -> None:
+    write, suffix, _ = SAMPLES[program]
+    for key in ("lens", "type", "lens_kind"):
+        more = {f"{key}_left" if program == "EasyMocap" else key: model}
+        if program == "CMU Panoptic" and key == "type":
+            continue  # it states the kind of its cameras so
+        if program == "OpenCV" and model == "fisheye" and key != "lens_kind":
+            assert one_of(tmp_path, write(**more), suffix).fisheye
+            continue
+        message = refused(tmp_path, write(**more), suffix)
+        assert key in message or repr(model) in message
+
+
+@each("key", ["P", "projection_matrix"])
+@each("as_opencv", [False, True])
+def test_a_projection_is_passed_over_unless_it_alone_places_the_camera(
+    tmp_path: Path, key: str, as_opencv: bool
+) -> None:
+    matrix = np.array(programs.K) @ np.array(programs.FROM_WORLD)[:3]
+    value: Any = matrix.tolist()
+    if as_opencv:
+        value = {"rows": 3, "cols": 4, "dt": "d", "data": matrix.ravel().tolist()}
+    one = one_of(tmp_path, programs.opencv(**{key: value}))
+    np.testing.assert_allclose(one.position, [0.0, -4.0, 1.0], atol=1e-6)
+    values = json.loads(programs.opencv(**{key: value}))
+    del values["rvec"], values["tvec"]
+    assert f"the key {key!r}" in refused(tmp_path, json.dumps(values))
+    # of a rectified picture
+    values[key] = np.hstack([programs.K, [[-60.0], [0.0], [0.0]]]).tolist()
+    assert one_of(tmp_path, json.dumps(values)).rotation is None
+
+
 @each(
     "more",
     [
@@ -130,7 +197,8 @@ def test_a_key_that_a_program_does_not_write_is_refused_by_name(
         {"rvecs": np.ones((4, 3)).tolist(), "tvecs": np.ones((4, 3)).tolist()},
         {"new_camera_matrix": programs.K, "fov_x_deg": 67.3, "camera_angle_x": 1.2},
         {"distance_m": 4.0, "lens_focal_mm": 4.2, "model": "HERO9", "note": "left one"},
-        {"P": np.ones((3, 4)).tolist(), "per_view_errors": [0.1, 0.2]},
+        {"P": np.eye(3, 4).tolist(), "per_view_errors": [0.1, 0.2]},
+        {"timestamp": 1.7e9, "calibration_time": 12.5, "model": "HERO9 Black"},
     ],
 )
 def test_numbers_that_describe_neither_lens_nor_place_are_passed_over(

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import posefit
+from posefit.errors import InputError
 from posefit.footage.extract import extract
 from posefit.footage.extraction import Extraction
 from posefit.footage.kinds import KINDS, Kind, resolve
@@ -381,3 +382,25 @@ def test_images_without_a_common_number_are_refused(tmp_path: Path) -> None:
         match="one number in the names of all cameras, got 100 to 102 of .*a and 104",
     ):
         seen(sources, camera=[camera(each) for each in VIEWS])
+
+
+@pytest.mark.parametrize("kind", [".npz", ".npy", "folder", "list of lists", "array"])
+def test_no_source_is_that_of_two_cameras(tmp_path: Path, kind: str) -> None:
+    source = MASKS[kind](tmp_path, masks())
+    twice = [source[0], source[0]] if kind == "list of lists" else [source, source]
+    with pytest.raises(InputError, match="its own source, got .* twice"):
+        seen(twice, camera=[camera(each) for each in VIEWS], fps=FPS)
+    if isinstance(source, Path):
+        with pytest.raises(InputError, match="its own source"):
+            resolve([source, str(source.parent / "." / source.name)])
+
+
+@pytest.mark.parametrize("written", [False, True])
+def test_no_two_cameras_are_at_one_place(tmp_path: Path, written: bool) -> None:
+    sources = [masks(azimuth) for azimuth in VIEWS]
+    one: Any = camera()
+    if written:
+        (tmp_path / "a.json").write_text(one.to_json())
+        one = tmp_path / "a.json"
+    with pytest.raises(InputError, match="one place and one direction for"):
+        seen(sources, camera=[one, one], fps=FPS)

@@ -25,6 +25,7 @@ from posefit.geometry.units import CMU_UNIT
 from posefit.motion import recorded
 from posefit.motion.amc import read_amc, read_clip, write_amc
 from posefit.motion.asf import parse_asf, write_asf
+from posefit.motion.clips import skeleton_file
 from tests.cases import each
 from tests.geometry.turns import about, chained
 
@@ -206,6 +207,7 @@ def test_a_skeleton_by_hand(skeleton: Skeleton, tmp_path: Path) -> None:
             "11: expected root order TX TY TZ RX RY RZ, got 'order",
         ),
         ("axis 0 0 20  XYZ", "axis 0 0 20  ZYX", "21: expected axis order XYZ"),
+        ("angle deg", "angle rad", "21: expected an axis of up to 360 degrees"),
         (
             "direction 0 -2 0",
             "direction 0 0 0",
@@ -399,6 +401,34 @@ def test_the_rate_is_the_files_or_given_or_assumed_and_reported(tmp_path: Path) 
     amc.write_text("# 1e9 frames a second\n" + text)
     with pytest.raises(ValueError, match=r"a.amc:1: expected .*got"):
         read_clip(asf, amc)
+
+
+def test_angles_of_another_unit_than_the_file_states_are_said(tmp_path: Path) -> None:
+    walk = recorded.clip("16_15").motion().frames(0, 4)
+    asf, amc = written(tmp_path, walk)
+    assert read_clip(asf, amc).notes == ()
+    text = amc.read_text()
+    amc.write_text(text.replace(":DEGREES", ":RADIANS"))
+    assert "radians seem to be degrees" in " ".join(read_clip(asf, amc).notes)
+    lines = []
+    for line in text.splitlines():
+        bone, *values = line.split()
+        if values and line[0].isalpha():
+            kept = 3 if bone == "root" else 0
+            angles = np.radians(np.array(values[kept:], dtype=float)).tolist()
+            line = " ".join([bone, *values[:kept], *map(repr, angles)])
+        lines.append(line)
+    amc.write_text("\n".join(lines) + "\n")
+    assert "degrees may be radians" in " ".join(read_clip(asf, amc).notes)
+
+
+@each("suffix", ["asf", "ASF", "Asf"])
+def test_the_only_skeleton_beside_a_motion_is_taken(
+    tmp_path: Path, suffix: str
+) -> None:
+    asf, amc = written(tmp_path, recorded.clip("16_15").motion().frames(0, 4))
+    asf.rename(tmp_path / f"b.{suffix}")
+    assert skeleton_file(amc, None) == tmp_path / f"b.{suffix}"
 
 
 @each("stated", ["  length 1.0\n", "  length 0.001\n", None])

@@ -50,6 +50,62 @@ def any_motion(frames: int = 6) -> Motion:
     )
 
 
+# of each frame time as a file has it: the rate, and whether that is said
+@each(
+    ("written", "rate", "said"),
+    [
+        ("0.033333", 30.0, False),
+        ("0.0333", 30.0, True),
+        ("3.33e-2", 30.0, True),
+        ("0.033", 30.0, True),
+        ("0.0334", 30e3 / 1001.0, True),
+        ("0.033367", 30e3 / 1001.0, False),
+        ("0.0417", 24.0, True),
+        ("0.04166", 24.0, True),
+        ("0.01666", 60.0, True),
+        ("0.0083", 120.0, True),
+        ("0.008342", 120e3 / 1001.0, False),
+        ("0.0041667", 240.0, False),
+        ("0.004", 250.0, False),
+        ("0.008", 125.0, False),
+        ("0.0125", 80.0, False),
+        ("0.0129", 1.0 / 0.0129, False),
+        ("0.07", 1.0 / 0.07, False),
+    ],
+)
+def test_a_rounded_frame_time_is_that_of_a_usual_rate(
+    tmp_path: Path, written: str, rate: float, said: bool
+) -> None:
+    path = tmp_path / "x.bvh"
+    write_bvh(path, any_motion())
+    text = path.read_text().replace(
+        f"Frame Time: {1 / 120!r}", f"Frame Time: {written}"
+    )
+    path.write_text(text)
+    motion = read_bvh(path, unit="m")
+    assert motion.fps == pytest.approx(rate)
+    assert any("a second" in note for note in motion.notes) == said
+
+
+@each(
+    ("scale", "said"),
+    [(1.0, ""), (np.pi / 180.0, "may be radians"), (1e-4, "")],
+)
+def test_angles_that_seem_to_be_radians_are_said(
+    tmp_path: Path, scale: float, said: str
+) -> None:
+    path = tmp_path / "x.bvh"
+    write_bvh(path, load_motion("walk").frames(0, 4))
+    head, time, table = re.split(r"(Frame Time: .*\n)", path.read_text())
+    rows = np.array([row.split() for row in table.splitlines()], dtype=float)
+    rows[:, 3:] *= scale
+    table = "\n".join(" ".join(map(repr, row)) for row in rows.tolist())
+    path.write_text(f"{head}{time}{table}\n")
+    notes = " ".join(read_bvh(path).notes)
+    assert ("radians" in notes) == bool(said)
+    assert said in notes
+
+
 @each("names", ["cgspeed", "acclaim"])
 def test_joints_are_where_the_file_puts_them(tmp_path: Path, names: str) -> None:
     path = tmp_path / "x.bvh"

@@ -12,7 +12,8 @@ from typing import Any
 import pytest
 
 from posefit.sweep.cell import TrackCell, cell_from
-from posefit.sweep.ledger import FILE, Writer
+from posefit.sweep.schema import FILE
+from posefit.sweep.writer import Writer
 from tests.commands import run
 
 # what no page may take for markup

@@ -5,9 +5,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from posefit.report.contest import Contest, Runs
-from posefit.report.leaderboard import contest_of, leaderboard
-from posefit.report.runs import runs_of
+from posefit.report.contest import Contest, Runs, contest_of
+from posefit.report.leaderboard import Standings, leaderboard
+from posefit.report.reading import runs_of
 from posefit.report.summary import leader_sentences
 from posefit.sweep.ledger import Ledger
 from tests.report.browser import ledger, result
@@ -66,9 +66,21 @@ def three_methods() -> Errors:
 
 def sentences(contest: Contest) -> list[str]:
     """Return the sentences of a report."""
-    return leader_sentences(contest, leaderboard(contest), baselines(contest))
+    return leader_sentences(standings(contest))
+
+
+def standings(contest: Contest) -> Standings:
+    """Return its leaderboard and its baselines."""
+    return Standings(
+        contest, leaderboard(contest), contest.runs.kind.baselines(contest)
+    )
+
+
+def board_of(contest: Contest) -> list[dict[str, Any]]:
+    """Return the rows of its leaderboard by name."""
+    return [row.as_dict() for row in leaderboard(contest)]
 
 
 def baselines(contest: Contest) -> list[dict[str, Any]]:
     """Return the rows of its baselines."""
-    return contest.runs.kind.baseline_rows(contest)
+    return [row.as_dict() for row in contest.runs.kind.baselines(contest)]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from posefit.report.coco import write_coco
-from posefit.report.runs import runs_of
+from posefit.report.reading import runs_of
 from posefit.suites.problem import TARGETS
 from posefit.sweep.ledger import Ledger
 from tests.commands import error_of, run

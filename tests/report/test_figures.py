@@ -1,12 +1,14 @@
 """Figures: what is drawn is what was given."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from posefit.report import figures
 from posefit.report.charts import Chart, Line
 from posefit.report.page import LIGHT
-from posefit.report.tracks import SCORE
+from tests.report.contests import contest_of_errors, full, standings
 
 pytest.importorskip("matplotlib")
 
@@ -52,13 +54,16 @@ def test_a_method_has_the_colour_of_the_page_and_the_legend_the_leaderboards_ord
     ]
 
 
-def test_the_leaderboard_is_a_picture_with_its_rows_from_top_to_bottom():
-    row = {"low": 0.5, "high": 1.5, SCORE.name: 1.0, "name": "a", "method": 2}
-    other = {**row, "low": None, "high": None, SCORE.name: 2.0, "name": "b"}
-    axes = figures.board_figure(SCORE, [row, other], [("mean pose", 4.0)]).axes[0]
+def test_the_leaderboard_is_a_picture_with_its_rows_from_top_to_bottom(tmp_path):
+    contest = contest_of_errors(tmp_path, full({"a": 1.0, "b": 2.0}, instances=4))
+    made = standings(contest)
+    other = replace(made.board[1], interval=None)
+    axes = figures.board_figure(replace(made, board=[made.board[0], other])).axes[0]
     assert [text.get_text() for text in axes.get_yticklabels()] == ["a", "b"]
     assert axes.yaxis_inverted()
-    interval, first, second, baseline = axes.lines
-    assert list(interval.get_xdata()) == [0.5, 1.5]
-    assert [float(one.get_xdata()[0]) for one in (first, second, baseline)] == [1, 2, 4]
-    assert first.get_color() == [*LIGHT.values()][2]
+    interval, first, second, baseline, *_ = axes.lines
+    assert tuple(interval.get_xdata()) == made.board[0].interval
+    # errors are 0.1 higher on each instance, and 0.01 higher with the second seed
+    values = [float(one.get_xdata()[0]) for one in (first, second, baseline)]
+    assert values == pytest.approx([1.155, 2.155, 4.0])
+    assert first.get_color() == figures.COLOURS[0]

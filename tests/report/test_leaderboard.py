@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from posefit.report.charts import certainty, convergence, grid, joint_errors
-from posefit.report.leaderboard import contest_of, leaderboard, paired_tests_of
+from posefit.report.contest import contest_of
 from posefit.report.tracks import error_with_losses
 from tests.report.browser import ledger, result, sure
 from tests.report.contests import (
     FIRST,
     baselines,
+    board_of,
     contest_of_errors,
     contest_of_results,
     full,
@@ -30,7 +31,7 @@ def test_a_method_that_shares_too_few_runs_is_listed_last_with_its_own_runs(
         tmp_path,
         {key: e for key, e in errors.items() if key[0] != "late" or key[1] == 0},
     )
-    rows = leaderboard(contest)
+    rows = board_of(contest)
     assert [(row["name"], row["taking_part"], row["runs"]) for row in rows] == [
         ("a", True, 8), ("b", True, 8), ("late", False, 2),
     ]  # fmt: skip
@@ -40,7 +41,7 @@ def test_a_method_that_shares_too_few_runs_is_listed_last_with_its_own_runs(
 
 def test_p_holds_for_all_comparisons_together(tmp_path: Path) -> None:
     # equal differences in 6 blocks: p = 2 / 2^6 = 0.031 each, and 0.094 after Holm
-    board = leaderboard(
+    board = board_of(
         contest_of_errors(tmp_path, full({"a": 1.0, "b": 2.0, "c": 3.0}, instances=3))
     )
     assert [row["p"] for row in board[1:]] == pytest.approx([3 * 2 / 2**6] * 2)
@@ -52,7 +53,7 @@ def test_the_leaderboard_has_means_and_baselines_have_skills_too(
     contest = contest_of_errors(
         tmp_path, {("a", i, 0): error for i, error in enumerate([1.0, 2.0, 3.0, 50.0])}
     )
-    (row,) = leaderboard(contest)
+    (row,) = board_of(contest)
     assert row["error_with_losses_degrees"] == pytest.approx(14.0)
     assert row["skill.mean_pose"] == pytest.approx(1.0 - 14.0 / 4.0)
     assert row["low"] is None  # one seed gives no interval
@@ -84,7 +85,7 @@ def test_a_skill_is_computed_from_the_reported_errors(tmp_path: Path) -> None:
         row["baseline"]: row["error_with_losses_degrees"] for row in baselines(contest)
     }
     assert shown == {"mean_pose": 8.0, "persistence": None, "nearest": None}
-    board = {row["name"]: row for row in leaderboard(contest)}
+    board = {row["name"]: row for row in board_of(contest)}
     assert [board[name]["skill.mean_pose"] for name in "ab"] == pytest.approx(
         [1.0 - 4.0 / 8.0, 1.0 - 8.0 / 8.0]
     )
@@ -94,7 +95,7 @@ def test_a_skill_is_computed_from_the_reported_errors(tmp_path: Path) -> None:
 
 
 def test_rows_have_their_effect_and_how_many_tracks_lost_frames(tmp_path: Path) -> None:
-    board = leaderboard(contest_of_errors(tmp_path, three_methods()))
+    board = board_of(contest_of_errors(tmp_path, three_methods()))
     assert [row["name"] for row in board] == ["a", "c", "b"]
     assert [board[0][name] for name in ("behind", "p", "blocks_needed")] == [None] * 3
     # c is 0.001 behind and ahead in turn: of twelve Student's t is 2.200985
@@ -109,7 +110,7 @@ def test_rows_have_their_effect_and_how_many_tracks_lost_frames(tmp_path: Path) 
         result(replace(FIRST, instance=i), 1.0, lost_rate=rate)
         for i, rate in rates.items()
     ]
-    (row,) = leaderboard(contest_of_results(tmp_path / "lost", made))
+    (row,) = board_of(contest_of_results(tmp_path / "lost", made))
     assert (row["lost_tracks"], row["runs"]) == (2, 3)
 
 
@@ -146,8 +147,15 @@ def test_one_or_two_lost_tracks_give_no_interval_and_none_or_more_do(
             for i in range(4)
             for s in range(2)
         ]
-        (made_row,) = leaderboard(contest_of_results(tmp_path / str(lost), made))
+        contest = contest_of_results(tmp_path / str(lost), made)
+        (made_row,) = board_of(contest)
         assert (made_row["low"] is not None) == is_shown, lost
+        # nor have its curve and its joints
+        (curve,) = convergence(contest, grid(contest))
+        assert curve is not None
+        assert curve.low is not None
+        assert np.isfinite(curve.low).all() == is_shown
+        assert np.isfinite(joint_errors(contest)[0].low).all() == is_shown
 
 
 def test_curves_start_and_end_with_the_traces(tmp_path: Path) -> None:
@@ -199,7 +207,7 @@ def test_certainty_is_pooled_over_runs_frame_by_frame(tmp_path: Path) -> None:
     assert a["width"] == pytest.approx([30.0, 60.0, 120.0])
     # of 40 frames near 0.55 are 5 + 9 right, of 30 at 1 are 27
     assert a["ece"] == pytest.approx((40 * 0.2 + 30 * 0.1) / 70, rel=1e-5)
-    row, other = leaderboard(contest)
+    row, other = board_of(contest)
     assert (row["unknown_rate"], row["swap_rate"], row["coverage.80"]) == pytest.approx(
         (0.3, 0.1, 0.75)
     )
@@ -224,11 +232,9 @@ def test_one_missing_run_takes_one_block_and_not_a_seed_of_every_instance(
     contest = contest_of_errors(tmp_path, errors)
     assert contest.blocks.shape == (5, 11)
     assert np.bincount(contest.instance).tolist() == [3, 3, 3, 2]
-    assert leaderboard(contest)[0]["runs"] == 11
+    assert board_of(contest)[0]["runs"] == 11
     # the other methods' runs of the missing instance and seed
     assert contest.left_out == 4
-    tests = paired_tests_of(contest)
-    assert tests is not None
-    assert tests["blocks"] == 11
     # all differences are equal
-    assert [pair[6] for pair in tests["pairs"]] == pytest.approx([10 * 2 / 2**11] * 10)
+    adjusted = [test.adjusted for test in contest.comparisons]
+    assert adjusted == pytest.approx([10 * 2 / 2**11] * 10)

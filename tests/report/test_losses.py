@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from posefit.report.contest import Contest
-from posefit.report.leaderboard import leaderboard
+from posefit.report.leaderboard import Standings, leaderboard
 from posefit.report.summary import leader_sentences
 from posefit.report.tracks import LOSS, error_with_losses
 from tests.report.contests import contest_of_errors, full
@@ -71,8 +71,8 @@ def test_a_method_that_loses_tracks_never_leads_an_otherwise_equal_one(
     first = dict.fromkeys(METHODS, 0)
     for sweep in sweeps(contest, SWEEPS, error_of_lost, np.random.default_rng(5)):
         board = leaderboard(sweep)
-        first[board[0]["name"]] += 1
-        sentence = leader_sentences(sweep, board, [])[0]
+        first[board[0].name] += 1
+        sentence = leader_sentences(Standings(sweep, board, []))[0]
         assert sentence.startswith("all-kept lost frames in none of 24 tracks")
         assert "; it leads " in sentence
     assert first == {"all-kept": SWEEPS, "lossy": 0, "worse": 0, "worst": 0}

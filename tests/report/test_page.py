@@ -1,6 +1,8 @@
 """The report in a real browser: it opens without errors, it is accessible, and its controls work."""
 
+import json
 import re
+import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -11,7 +13,7 @@ from typing import Any
 import pytest
 
 from posefit.errors import printable
-from posefit.report.repeat import repeat_command
+from posefit.sweep.repeat import BEGIN, END, repeat_command
 from tests.report.browser import EVIL, ledger, opened, result, sure, written
 from tests.report.searched import cell, problems, search_result, searched
 from tests.sweep.fake import cells, rows_in
@@ -92,6 +94,12 @@ def texts(page: Any, table: str, column: int) -> list[str]:
             f"{table} tbody tr td:nth-child({column})"
         ).all_inner_texts()
     ]
+
+
+def cell_in(command: str) -> str:
+    """Return the cell of a track's command, whatever the order of its lines."""
+    plan = command.removeprefix(BEGIN).removesuffix(END)
+    return json.dumps(tomllib.loads(plan), sort_keys=True)
 
 
 BOXES = """id => [...document.querySelectorAll(`#${id} svg text`)].map((one) => {
@@ -185,11 +193,16 @@ def test_the_first_screen_has_the_leader_the_figure_and_failures(
 def test_tables_sort_and_compare_and_mark_warnings(chromium: Any, tracks: Path) -> None:
     with shown(chromium, tracks) as page:
         heads = page.locator("#leaders th")
+        data = json.loads(page.locator("#data").text_content())
+        names = [row["name"] for row in data["leaderboard"]]
+        pairs = zip(texts(page, "#leaders", 1)[:METHODS], names, strict=True)
+        assert all(text.startswith(name) for text, name in pairs)
+        heads.nth(1).locator("button").focus()
+        page.keyboard.press("Enter")
         assert heads.nth(1).get_attribute("aria-sort") == "ascending"
         errors = [float(text) for text in texts(page, "#leaders", 2)]
         assert errors == sorted(errors)
         assert len(errors) == METHODS + 3  # and baselines
-        heads.nth(1).locator("button").focus()
         page.keyboard.press("Enter")
         assert [float(text) for text in texts(page, "#leaders", 2)] == errors[::-1]
         visible = [k for k in range(heads.count()) if heads.nth(k).is_visible()]
@@ -272,9 +285,10 @@ def test_hostile_names_are_text_and_commands_repeat_their_rows(
         buttons = page.locator("#all-rows td button")
         for k in range(buttons.count()):
             buttons.nth(k).click()
-            commands.add(page.locator("#command").text_content())
+            commands.add(cell_in(page.locator("#command").text_content()))
             page.locator("#again .close").click()
-        assert commands == {repeat_command(row["spec"]) for row in finished}
+        specs = [row["spec"] for row in finished]
+        assert commands == {cell_in(repeat_command(spec)) for spec in specs}
         buttons.nth(0).click()
         page.locator("#copy").click()
         page.get_by_text("copied").wait_for()

@@ -23,7 +23,7 @@ REPORT = """
 import json, sys, time
 from posefit.report.write import write_report
 began = time.perf_counter()
-done = write_report(sys.argv[1], sys.argv[2])["header"]["done"]
+done = write_report(sys.argv[1], sys.argv[2]).data["header"]["done"]
 taken = time.perf_counter() - began
 status = dict(line.split(":", 1) for line in open("/proc/self/status"))
 print(json.dumps([done, taken, 1024 * int(status["VmHWM"].split()[0])]))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from posefit.report.contest import Runs
-from posefit.report.runs import distinct
+from posefit.report.names import distinct
 from posefit.report.tracks import TRACKS
 from tests.report.browser import ledger, result
 from tests.report.contests import FIRST, full, results_of, runs_in

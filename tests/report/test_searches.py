@@ -9,13 +9,20 @@ import numpy as np
 import pytest
 
 from posefit.report.content import data_of
-from posefit.report.leaderboard import leaderboard
-from posefit.report.runs import runs_of
+from posefit.report.leaderboard import standings_of
+from posefit.report.reading import runs_of
 from posefit.sweep.ledger import Ledger
 from tests.commands import error_of, run
 from tests.files import csv_rows
 from tests.report.browser import data_in, ledger, result, written
-from tests.report.contests import FIRST, baselines, contest_in, runs_in, sentences
+from tests.report.contests import (
+    FIRST,
+    baselines,
+    board_of,
+    contest_in,
+    runs_in,
+    sentences,
+)
 from tests.report.searched import cell, problems, search_result, searched
 
 LOST = (
@@ -29,7 +36,7 @@ def test_the_leader_and_its_certainty_are_one_sentence(tmp_path: Path) -> None:
     contest = contest_in(
         searched(tmp_path / "r", {"cma": 10, "random": 2}, problems([1, 5], [9, 24], 3))
     )
-    board = leaderboard(contest)
+    board = board_of(contest)
     assert [(row["name"], row["runs"]) for row in board] == [
         ("cma", 12),
         ("random", 12),
@@ -52,7 +59,7 @@ def test_the_interval_is_over_instances_in_any_number_of_dimensions(
         searched(tmp_path / str(len(d)), {"cma": 10}, problems([1], d, 3))
         for d in ([9], [9, 24])
     )
-    rows = [leaderboard(contest_in(path))[0] for path in (flat, both)]
+    rows = [board_of(contest_in(path))[0] for path in (flat, both)]
     # 10, 11 and 12 of 29: a standard deviation of 1, so t of 2 degrees of freedom, 4.302653, over the root of 3
     assert rows[0]["high"] - rows[0]["reached"] == pytest.approx(
         4.302653 / math.sqrt(3.0) * 100.0 / 29.0
@@ -108,7 +115,8 @@ def test_curves_and_running_times_follow_from_the_traces(tmp_path: Path) -> None
     # 9 + 2 and 9; 9 and 9 + 1
     path = searched(tmp_path / "r", {"cma": 9}, problems([1, 5], [9], 2))
     with Ledger(path) as results:
-        data = data_of(results, runs_of(results))
+        runs = runs_of(results)
+        data = data_of(results, runs, standings_of(runs))
     assert [chart["title"] for chart in data["charts"]] == [
         "All functions",
         "1 single image",
@@ -172,7 +180,11 @@ def test_the_command_prints_the_leader_failures_and_leaderboard_and_writes_a_pag
     assert data["answer"] == lines[:2]
     assert data["failures"][0]["name"] == "pso on f1 in 9D, instance 10001, seed 3"
     assert data["baselines"] == [
-        {"baseline": "random", "reached": pytest.approx(10.345)}
+        {
+            "baseline": "random",
+            "title": "random search",
+            "reached": pytest.approx(10.345),
+        }
     ]
     assert len(csv_rows(tmp_path / "rows.csv")) == 12 + 1
     printed = json.loads(run("report", results, "--json").stdout)

@@ -8,11 +8,11 @@ import numpy as np
 from scipy import stats
 
 from posefit.report.columns import listed
-from posefit.report.leaderboard import leaderboard
 from posefit.report.summary import unpaired_sentence
 from tests.report.browser import result
 from tests.report.contests import (
     FIRST,
+    board_of,
     contest_of_errors,
     contest_of_results,
     full,
@@ -32,7 +32,7 @@ def reach_of(differences: list[float], comparisons: int) -> float:
 
 def test_the_leader_its_lead_and_how_certain_it_is(tmp_path: Path) -> None:
     contest = contest_of_errors(tmp_path, three_methods())
-    first = leaderboard(contest)[0]
+    first = board_of(contest)[0]
     # b is behind by 1, 1.02 and 1.04 in turn: p is below 1e-12
     reach = reach_of([1.0, 1.02, 1.04] * 4, 3)
     low, high = 1.02 - reach, 1.02 + reach

@@ -13,8 +13,9 @@ import pytest
 
 from posefit.page.document import embedded, plain
 from posefit.report.content import data_of
+from posefit.report.leaderboard import standings_of
 from posefit.report.page import MARK
-from posefit.report.runs import runs_of
+from posefit.report.reading import runs_of
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.table import write_csv
 from tests.commands import error_of, run
@@ -46,7 +47,8 @@ def results(tmp_path: Path) -> Path:
 def header_of(made: Path) -> dict[str, Any]:
     """Return the header of the page about a ledger."""
     with Ledger(made) as opened:
-        header: dict[str, Any] = data_of(opened, runs_of(opened))["header"]
+        runs = runs_of(opened)
+        header: dict[str, Any] = data_of(opened, runs, standings_of(runs))["header"]
     return header
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from posefit.report.tracks import MIN_LOST
+from posefit.report.contest import MIN_LOST
 from posefit.statistics.means import Intervals, run_means
 
 Array = NDArray[np.float64]

@@ -52,7 +52,7 @@ EVENTS = (
 )
 STOPPED = 1.0  # seconds that a process is stopped
 PAUSE = 0.3, 1.5  # seconds between two events, at least and at most
-CONNECT_TIMEOUT_SECONDS = 60.0  # seconds for a driver to begin cells, or to end
+CONNECT_TIMEOUT_SECONDS = 600.0  # for a driver to begin cells, or to end
 STARTED = 200  # times that a driver is started, at most
 LIMIT = 10.0  # seconds that a cell may take
 

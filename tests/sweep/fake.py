@@ -149,7 +149,8 @@ def result(cell: TrackCell) -> dict[str, Any]:
 def swept(out: Path, chosen: Sequence[Cell], engine: "Engine") -> "Tally":
     """Return how a sweep by an engine ended."""
     from posefit.sweep.drive import drive
-    from posefit.sweep.ledger import FILE, Writer
+    from posefit.sweep.schema import FILE
+    from posefit.sweep.writer import Writer
 
     with Writer(out / FILE) as ledger:
         ledger.plan(chosen)

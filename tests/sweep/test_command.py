@@ -9,8 +9,9 @@ from typing import Any
 
 import pytest
 
-from posefit.sweep.ledger import FILE, Writer
 from posefit.sweep.plan import Plan
+from posefit.sweep.schema import FILE
+from posefit.sweep.writer import Writer
 from tests.cases import each
 from tests.commands import error_of, printed, run
 from tests.report.browser import ledger, result

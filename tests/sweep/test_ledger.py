@@ -21,15 +21,9 @@ from posefit.errors import InputError
 from posefit.registry import registry
 from posefit.sweep.cell import other_version
 from posefit.sweep.command import cells_of, swept
-from posefit.sweep.ledger import (
-    ATTEMPTS,
-    FILE,
-    FORMAT,
-    LOSSES,
-    MIGRATIONS,
-    Ledger,
-    Writer,
-)
+from posefit.sweep.ledger import Ledger
+from posefit.sweep.schema import FILE, FORMAT, MIGRATIONS
+from posefit.sweep.writer import ATTEMPTS, LOSSES, Writer
 from posefit.version import posefit_build
 from tests.cases import each
 from tests.report import browser
@@ -220,7 +214,8 @@ def test_only_damage_is_called_damage(
 def test_a_ledger_that_another_program_locks_is_in_use(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("posefit.sweep.ledger.OPEN_SECONDS", 0.01)
+    for module in ("ledger", "writer"):
+        monkeypatch.setattr(f"posefit.sweep.{module}.OPEN_SECONDS", 0.01)
     folder = filled(tmp_path / "results", 2)
     with closing(sqlite3.connect(folder / FILE, isolation_level=None)) as other:
         # so that readers have to wait, too
@@ -355,7 +350,7 @@ def test_a_file_that_is_not_a_ledger_is_named(tmp_path: Path) -> None:
 
 HOLD = """
 import sys, time
-from posefit.sweep.ledger import Writer
+from posefit.sweep.writer import Writer
 with Writer(sys.argv[1]):
     print("open", flush=True)
     time.sleep(600)

@@ -185,6 +185,24 @@ def test_mistakes_are_named(tables: dict[str, Any], message: str) -> None:
         planned(**tables)
 
 
+@each(
+    ("tables", "message"),
+    [
+        ({"functions": [{"instance": 1}], "instances": [2]}, "a product must set instance in one list, got it in two"),
+        ({"functions": [{}], "dimensions": [9]}, "a cell must have a function, got none"),
+        ({"dimensions": [{}]}, "a cell must have a dimension, got none"),
+        ({"functions": [1, 7], "dimensions": [9]}, "functions must exist in one of the plan's dimensions, got 7, which"),
+        ({"functions": ["1"]}, "function must be a whole number of at least 1, got '1'"),
+        ({"methods": [{"name": "a"}]}, "method must be a name, got None"),
+    ],
+)  # fmt: skip
+def test_mistakes_in_plans_of_searches_are_named(
+    tables: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        Plan.of({"suite": SUITE, "methods": ["pso"], "instances": 1, **tables})
+
+
 def test_a_file_that_is_no_plan_is_named(tmp_path: Path) -> None:
     path = tmp_path / "plan.toml"
     for place, content, message in (

@@ -22,10 +22,12 @@ from posefit.sweep.cell import SearchCell, TrackCell, run_cell
 from posefit.sweep.command import swept as sweep
 from posefit.sweep.drive import Tally, drive
 from posefit.sweep.engine import Engine, Limits, Outcome
-from posefit.sweep.ledger import ATTEMPTS, FILE, Ledger, Writer
+from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
 from posefit.sweep.pool import Pool
+from posefit.sweep.schema import FILE
 from posefit.sweep.worker import _Process, become_worker
+from posefit.sweep.writer import ATTEMPTS, Writer
 from posefit.version import posefit_build
 from tests.cases import each
 from tests.sweep import fake

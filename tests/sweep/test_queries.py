@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from posefit.sweep.ledger import FILE, VIEWED
+from posefit.sweep.schema import FILE, VIEWED
 from tests.report.browser import ledger, result
 from tests.report.searched import searched
 from tests.sweep.fake import cells

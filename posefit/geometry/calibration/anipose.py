@@ -8,10 +8,15 @@ the camera.
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from posefit.errors import InputError
 from posefit.geometry.calibration.dialect import Dialect
 from posefit.geometry.calibration.keys import check_others, unread
-from posefit.geometry.calibration.lens import Calibration, Place, numbers_of, stated
+from posefit.geometry.calibration.lens import (
+    Calibration,
+    Place,
+    check_both,
+    numbers_of,
+    stated,
+)
 from posefit.geometry.calibration.values import Stored, matrix_of
 
 KEYS = {
@@ -61,8 +66,7 @@ def _camera(name: str, table: Mapping[str, Any]) -> Calibration:
     place: Place | None = None
     if "rotation" in table and "translation" in table:
         place = matrix_of(table["rotation"]), matrix_of(table["translation"])
-    elif "rotation" in table or "translation" in table:
-        raise InputError("one with a rotation or a translation, but not both")
+    check_both(table.get("rotation"), table.get("translation"))
     return stated(
         name,
         matrix_of(table["size"]).tolist(),

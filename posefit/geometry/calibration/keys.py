@@ -9,10 +9,8 @@ import re
 from collections.abc import Collection, Mapping
 from typing import Any
 
-import numpy as np
-
 from posefit.errors import InputError
-from posefit.geometry.calibration.values import counts, plain, says
+from posefit.geometry.calibration.values import counts, matrix_of, plain, says
 from posefit.reading import quoted
 
 # keys that seem to describe a lens, such as radial_distortion, kappa1, k7, p3, s1, skew
@@ -36,7 +34,8 @@ _SUSPECT = re.compile(f"{_OF_LENS.pattern}|{_OF_PLACE.pattern}")
 # keys whose numbers describe neither the lens nor the place
 _HARMLESS = re.compile(
     # how good the calibration is, when it was made, and with which target
-    r".*(error|rms|residual|reproj|accura|deviation|std|date|time|stamp).*"
+    r".*(error|rms|residual|reproj|accura|deviation|std|date|stamp).*"
+    r"|.*time(?!.*(offset|shift|delay|lag)).*"
     r"|.*(board|square|chess|charuco|aruco|marker|pattern|corner|grid).*"
     r"|.*(points?|images?|views?|frames?|samples?)|(nr|num|number|count).*|.*count"
     # the camera's identity, and how it takes pictures
@@ -46,10 +45,19 @@ _HARMLESS = re.compile(
     r"|.*(focal(length)?|lens|sensor.*|pixelsize.*|aperture.*)(mm|um)?"
     r"|depth(scale|units?)"
     # values that follow from the numbers that are read
-    r"|(optimal|new).*|rectif.*|projectionmatrix|e|f|essential(matrix)?"
+    r"|(optimal|new).*|rectif.*|e|f|essential(matrix)?"
     r"|fundamental(matrix)?"
 )
-PROJECTION = "p"  # a matrix (3, 4); with two numbers, the key describes a lens
+# keys of a matrix (3, 4); with two numbers, `p` describes a lens
+_PROJECTIONS = ("p", "projectionmatrix")
+# models of lenses that are no polynomial, as texts state them under whatever key
+_MODEL = re.compile(
+    r"(opencv|radial|simpleradial|thinprism)*(fisheye|equidistant|equisolid(angle)?"
+    r"|stereographic|kannalabrandt|kb)[0-9]*|omni(directional)?|equirectangular"
+    r"|spherical|doublesphere|mei|e?ucm|fov"
+)
+# keys whose texts only name something
+_NAME = re.compile(r".*(id|name|serial|serialnumber|label|port|comment|notes?|path)")
 # keys of texts that would change the meaning of the numbers
 _CONVENTION = re.compile(r".*(convention|coordinate|handed|axes|axis).*")
 
@@ -75,11 +83,23 @@ def check_others(name: str, others: Mapping[str, Any], *, placed: bool = False) 
     _check_suspects(name, others, placed=placed)
     for key, value in others.items():
         word = plain(key)
-        if isinstance(value, dict):
+        if (
+            isinstance(value, str)
+            and _MODEL.fullmatch(plain(value))
+            and not _NAME.fullmatch(word)
+        ):
+            raise InputError(
+                f"the lens model {quoted(value)} under the key {quoted(key)} of "
+                f"{quoted(name)}, which is not read"
+            )
+        if word in _PROJECTIONS and _is_projection(value):
+            if not placed and _is_turned(value):
+                raise _unread_place(name, key)
+        elif isinstance(value, dict):
             # not deeper: aliases in YAML may repeat one table again and again
             inner = {k: v for k, v in value.items() if not isinstance(v, dict)}
             _check_suspects(name, inner, placed=placed)
-        elif not _is_harmless(word, value) and (
+        elif not _is_harmless(word) and (
             counts(value) or (_CONVENTION.fullmatch(word) and says(value))
         ):
             raise InputError(
@@ -88,10 +108,33 @@ def check_others(name: str, others: Mapping[str, Any], *, placed: bool = False) 
             )
 
 
-def _is_harmless(word: str, value: Any) -> bool:
+def _is_harmless(word: str) -> bool:
     # `_check_suspects` found no numbers in a key that matches `_SUSPECT`
-    return bool(_SUSPECT.fullmatch(word) or _HARMLESS.fullmatch(word)) or (
-        word == PROJECTION and np.size(value) == 12
+    return bool(_SUSPECT.fullmatch(word) or _HARMLESS.fullmatch(word))
+
+
+def _is_projection(value: Any) -> bool:
+    """Return whether a value is twelve numbers, a matrix (3, 4)."""
+    try:
+        return matrix_of(value).size == 12
+    except (ValueError, TypeError, KeyError):
+        return False
+
+
+def _is_turned(value: Any) -> bool:
+    """Return whether a projection (3, 4) turns the world.
+
+    A camera that does not turn it has fx 0 cx, 0 fy cy, 0 0 1 in the first columns.
+    """
+    turned = matrix_of(value).reshape(3, 4)
+    focal = abs(turned[0, 0])
+    return bool(max(abs(turned[1, 0]), *(focal * abs(turned[2, :2]))) > 1e-3 * focal)
+
+
+def _unread_place(name: str, key: str) -> InputError:
+    return InputError(
+        f"the key {quoted(key)} of {quoted(name)}, which is not read: give the "
+        "rotation and the translation from the world to the camera"
     )
 
 
@@ -111,7 +154,4 @@ def _check_suspects(name: str, others: Mapping[str, Any], *, placed: bool) -> No
             and not placed
             and (isinstance(value, dict) or counts(value))
         ):
-            raise InputError(
-                f"the key {quoted(key)} of {quoted(name)}, which is not read: give the "
-                "rotation and the translation from the world to the camera"
-            )
+            raise _unread_place(name, key)

@@ -320,6 +320,18 @@ def rotation_of(rotation: Any) -> Array:
     return numbers_of(rotation, (3, 3))
 
 
+def check_both(rotation: Any, translation: Any) -> None:
+    """Raise InputError if only one of a rotation and a translation is not None."""
+    if (rotation is None) == (translation is None):
+        return
+    has, lacks = "a rotation", "a translation"
+    if rotation is None:
+        has, lacks = lacks, has
+    raise InputError(
+        f"{has} without {lacks}, such as rvec and tvec, from the world to the camera"
+    )
+
+
 def placed_at(rotation: Array, position: Any) -> Place:
     """Return the place of a camera with a rotation (3, 3) and a position (3,).
 

@@ -45,6 +45,11 @@ def _read(stored: Stored) -> list[Calibration]:
             # a camera that was not aligned has no transform
             if camera.find("transform") is None:
                 continue
+            if camera.findtext("orientation", "1").strip() != "1":
+                raise InputError(
+                    f"the key 'orientation' of {quoted(str(camera.get('label')))}, "
+                    "which is not read: pictures must be upright as filmed"
+                )
             world = worlds.get(camera.get("component_id"), worlds.get(None))
             matrix = numbers_in(camera.findtext("transform")).reshape(4, 4)
             place = seen_from(matrix)
@@ -93,11 +98,12 @@ def _moved(place: Place, rotation: Array, translation: Array, scale: float) -> P
 
 
 def _camera(name: str, sensor: Any, place: Place, scale: Any) -> Calibration:
-    # if there are two calibrations, the second is the adjusted one
+    # the initial one is what the adjusted one was found from
     found = sensor.findall("calibration")
+    adjusted = [each for each in found if each.get("class") != "initial"]
     if not found:
         raise InputError(f"the sensor of {quoted(name)} without a calibration")
-    lens = found[-1]
+    lens = (adjusted or found)[-1]
     kind = lens.get("type", sensor.get("type", "frame"))
     if kind != "frame":
         raise InputError(f"the lens model {quoted(kind)}, which is not read")

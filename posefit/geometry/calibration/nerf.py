@@ -142,6 +142,11 @@ def _matrix(values: Mapping[str, Any], size: Sequence[float] | None) -> Array:
             focal.append(number_of(values[f"fl_{axis}"]))
         elif f"camera_angle_{axis}" in values:
             angle = number_of(values[f"camera_angle_{axis}"])
+            if not 0.0 < angle < math.pi:
+                raise InputError(
+                    f"a camera_angle_{axis} of {angle:g}, which must be radians "
+                    "between 0 and pi"
+                )
             focal.append(0.5 * side / math.tan(0.5 * angle))
         else:
             focal.append(None)

@@ -23,23 +23,26 @@ from posefit.geometry.calibration.keys import check_others
 from posefit.geometry.calibration.lens import (
     Calibration,
     Place,
+    check_both,
     numbers_of,
     pinhole_matrix,
     stated,
 )
 from posefit.geometry.calibration.values import (
     Stored,
+    counts,
     matrix_of,
     number_of,
     numbers_at,
     plain,
 )
-from posefit.reading import quoted
+from posefit.reading import cut, quoted
 
 MOST_TABLES = 10_000
+KEYS_SHOWN = 120  # most characters of a table's keys in a message
 INTRINSICS = (
     *("intrinsic", "intrinsics", "intrinsicmatrix", "intrinsicmat"),
-    *("cameraintrinsic", "cameraintrinsics"),
+    *("cameraintrinsic", "cameraintrinsics", "projectionparameters"),
 )
 MATRIX = (
     *("cameramatrix", "cameramat", "cameramtx", "matrix", "k", "m", "mtx"),
@@ -55,6 +58,11 @@ LENS = (
 MODEL = (
     *("distortionmodel", "fisheyemodel", "fisheye", "isfisheye", "lensmodel"),
     *("cameramodel", "model"),
+)
+# keys whose text may be a lens model, and may be anything else
+MODEL_TEXTS = (
+    *("type", "cameratype", "modeltype", "lens", "lenstype", "calibrationmodel"),
+    *("projection", "projectionmodel", "projectiontype", "distortiontype"),
 )
 SIZE = (
     *("imagesize", "size", "resolution", "imgsize", "imsize", "imageresolution"),
@@ -91,7 +99,7 @@ _POLYNOMIALS = (
 )
 # lens models that are not read
 _OTHERS = re.compile(
-    "omni|mei|unified|ucm|sphere|spherical|fov|prism|ocam|division|rectangular"
+    "omni|mei|unified|ucm|sphere|spherical|fov|prism|ocam|division|rectangular|fish"
 )
 
 
@@ -113,9 +121,10 @@ def _read(stored: Stored) -> list[Calibration]:
             if _first(known, MATRIX) is not None or _pinhole(known) is not None:
                 cameras.append(_camera(name, table, known))
             elif _first(known, (*LENS, *ROTATION, *SIZE, *SIDES[0][:1])) is not None:
+                keys = cut(", ".join(map(quoted, table)), KEYS_SHOWN)
                 raise InputError(
-                    f"{quoted(name)} without camera_matrix, image_width and "
-                    "image_height"
+                    f"the keys {keys} of {quoted(name)}, but no camera matrix, and no "
+                    "fx, fy, cx and cy"
                 )
             else:
                 around |= {k: v for k, v in table.items() if not _has_tables(v)}
@@ -187,6 +196,7 @@ def _camera(
     read = {*LENS, *MODEL, *numbered, *SIZE, *SIDES[0], *SIDES[1], *ROTATION}
     read |= {*TRANSLATION, *FOCAL, *sum(CENTRES, ()), *sum(BOARDS, ())}
     read.add(next((key for key in MATRIX if key in known), ""))
+    read |= {key for key in MODEL_TEXTS if _is_text(known.get(key))}
     others = {key: value for key, value in values.items() if plain(key) not in read}
     # the lens may be numbers with names, in the camera's table or in a separate one
     if lens is None or (isinstance(lens, dict) and "k1" in lens):
@@ -194,21 +204,33 @@ def _camera(
             if plain(key) not in {*numbered, *MODEL}:
                 others[key] = value
         lens = [(known if lens is None else lens).get(key, 0.0) for key in numbered]
-    size = _first(known, SIZE)
-    if size is None:
-        sides = [_first(known, names) for names in SIDES]
-    else:
-        sides = np.ravel(matrix_of(size)).tolist()
     place = _place(known)
     check_others(name, others, placed=place is not None)
     return stated(
         name,
-        None if None in sides else [number_of(side) for side in sides],
+        _size(known),
         _matrix(known),
         matrix_of(lens),
         place,
         fisheye=fisheye,
     )
+
+
+def _size(known: Mapping[str, Any]) -> list[float] | None:
+    """Return the width and the height, or None if the table does not state them."""
+    size = _first(known, SIZE)
+    if isinstance(size, dict) and "data" not in size:
+        known = {plain(key): value for key, value in size.items()}
+        size = None
+    if size is not None:
+        return [float(side) for side in np.ravel(matrix_of(size))]
+    sides = [_first(known, names) for names in SIDES]
+    return None if None in sides else [number_of(side) for side in sides]
+
+
+def _is_text(value: Any) -> bool:
+    """Return whether a value is a text that is no number."""
+    return isinstance(value, str) and not counts(value)
 
 
 def _matrix(known: Mapping[str, Any]) -> Array:
@@ -225,8 +247,7 @@ def _place(known: Mapping[str, Any]) -> Place | None:
     translation = _first(known, TRANSLATION)
     if rotation is not None and translation is not None:
         return matrix_of(rotation), matrix_of(translation)
-    if rotation is not None or translation is not None:
-        raise InputError("one with a rotation or a translation, but not both")
+    check_both(rotation, translation)
     for names in BOARDS:
         single = [matrix_of(known[key]) for key in names if key in known]
         if len(single) == 2 and all(numbers.size == 3 for numbers in single):
@@ -244,13 +265,15 @@ def _is_fisheye(known: Mapping[str, Any]) -> bool:
 
     Raises InputError for a lens model that OpenCV does not have.
     """
-    for key in (name for name in MODEL if name in known):
+    keys = [key for key in MODEL if key in known]
+    keys += [key for key in MODEL_TEXTS if _is_text(known.get(key))]
+    for key in keys:
         model = plain(known[key])
         if model in _FISHEYES:
             return True
-        if model not in _POLYNOMIALS and (
-            key not in ("cameramodel", "model") or _OTHERS.search(model)
-        ):
+        # cameras have models, too
+        is_lens = key not in ("cameramodel", "model", *MODEL_TEXTS)
+        if model not in _POLYNOMIALS and (is_lens or _OTHERS.search(model)):
             raise InputError(f"the lens model {quoted(known[key])}, which is not known")
     return False
 

@@ -97,12 +97,18 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
         cv2.error,
     ) as error:
         cause = " ".join(str(error).split()) or type(error).__name__
+        # the reader of posefit's own cameras names the file, too
+        cause = cause.removeprefix(f"{path}: ")
         reason = cut(f"no {cause}" if isinstance(error, KeyError) else cause, MESSAGE)
         raise InputError(
             f"{path}: expected a calibration{written_by}, got {reason}"
         ) from None
     if not calibrations:
-        raise InputError(f"{path}: expected a calibration with a camera, got none")
+        among = f" among {cut(', '.join(map(quoted, content.values)))}"
+        raise InputError(
+            f"{path}: expected a calibration with a camera, got none"
+            f"{among if content.values else ''}"
+        )
     if not chosen:
         return calibrations
     names = [calibration.name for calibration in calibrations]

@@ -39,20 +39,20 @@ class Stored:
 def stored(path: Path, text: str) -> Stored:
     """Parse a file's text. Raises InputError if it is in none of the four formats."""
     start = text.lstrip()[:100]
-    if path.suffix.lower() == ".toml":
+    suffix = path.suffix.lower()
+    if suffix == ".toml":
         return Stored(path, parsed_toml(text))
     if start.startswith("<"):
         root = _xml_of(text)
         if root.tag != "opencv_storage":
             return Stored(path, {}, root)
         return Stored(path, _of_opencv(root))
-    if not (
-        start.startswith(("{", "[", "%")) or path.suffix.lower() in (".yml", ".yaml")
-    ):
-        raise InputError(
-            f"another file, {path.suffix or 'without a suffix'}; YAML is .yml or .yaml"
-        )
-    values = parsed_json(text) if start.startswith(("{", "[")) else _yaml(text)
+    if suffix == ".json" or start.startswith(("{", "[")):
+        values = _json(text, suffix)
+    elif suffix in (".yml", ".yaml") or start.startswith("%"):
+        values = _yaml(text)
+    else:
+        raise _other(suffix)
     if isinstance(values, list):  # a list of cameras, as in the AIST database
         values = {"camera": values}
     if not isinstance(values, dict):
@@ -143,6 +143,23 @@ def number_of(value: Any) -> float:
 def numbers_at(table: Mapping[str, Any], *keys: str) -> list[float]:
     """Return the numbers under some keys, all of which must be there."""
     return [number_of(table[key]) for key in keys]
+
+
+def _other(suffix: str) -> InputError:
+    return InputError(
+        f"another file, {suffix or 'without a suffix'}; YAML, XML, JSON or TOML are "
+        "read, and YAML is .yml or .yaml"
+    )
+
+
+def _json(text: str, suffix: str) -> Any:
+    try:
+        return parsed_json(text)
+    except ValueError as error:
+        # other formats have brackets at their beginning, too
+        if suffix not in (".json", ".yml", ".yaml"):
+            raise _other(suffix) from None
+        raise InputError(f"broken JSON: {error}") from None
 
 
 def _yaml(text: str) -> Any:

@@ -60,6 +60,12 @@ def _camera(camera: Any, frame: Any) -> Calibration:
     name = str(camera.get("DEVICEID"))
     check_others(name, unread(camera.attrib, CAMERA))
     check_others(name, unread(frame.attrib, FRAME))
+    needed = {"SENSOR_SIZE": camera.get("SENSOR_SIZE")}
+    for key in ("PRINCIPAL_POINT", "FOCAL_LENGTH", "ORIENTATION", "POSITION"):
+        needed[key] = frame.get(key)
+    for key, value in needed.items():
+        if value is None:
+            raise InputError(f"the camera {quoted(name)} without {key}")
     size = numbers_of(numbers_in(camera.get("SENSOR_SIZE")), (2,))
     centre = numbers_of(numbers_in(frame.get("PRINCIPAL_POINT")), (2,))
     focal = number_of(frame.get("FOCAL_LENGTH"))

@@ -1,9 +1,9 @@
 // One method compared with all others, by paired tests and instance by instance.
-const probability = (p) => (!given(p) ? "–" : p < 0.001 ? "< 0.001" : p.toFixed(3));
-const MAX_NEEDED = 1e6;
-const neededRuns = (count) => (count > MAX_NEEDED ? `more than ${whole(MAX_NEEDED)}` : whole(count));
+const probability = (p) => (!given(p) ? "–" : p < D.constants.least_p ? `< ${D.constants.least_p}` : p.toFixed(3));
+const neededRuns = (count) =>
+  count > D.constants.max_blocks ? `more than ${whole(D.constants.max_blocks)}` : whole(count);
 const twoDigits = (value) => number(value, 2);
-const verdict = (row) => (row.adjusted >= 0.05 ? "no difference shown" : row.difference < 0 ? "better" : "worse");
+const verdict = (row) => (row.adjusted >= D.constants.significance ? "no difference shown" : row.difference < 0 ? "better" : "worse");
 
 // Every paired test of a method, turned so that it comes first: a difference below 0 is in its favour.
 function duelsOf(m) {
@@ -36,7 +36,7 @@ function comparison() {
     column("p after Holm", "adjusted", probability, { about: `Adjusted for all ${P?.pairs.length} comparisons` }),
     textColumn("verdict", verdict),
     column("runs needed", "needed", neededRuns, {
-      about: "Paired runs that would show such a difference with a probability of 80 %",
+      about: `Paired runs that would show such a difference with a probability of ${whole(100 * D.constants.power)} %`,
     }),
   ];
   const show = (m) => {

@@ -23,15 +23,17 @@ function firstScreen() {
     );
   if (rows.length > MAX_METHODS) notes.push(`The table has ${counted(rows.length - MAX_METHODS, "more method")}.`);
   $("standing-note").textContent = notes.join(" ");
-  const lines = bases.map((row) => ({ ...row, name: D.baseline_names[row.baseline] }));
-  drawn($("standing"), (width) => forest(width, rows.slice(0, MAX_METHODS), lines));
+  drawn($("standing"), (width) => forest(width, rows.slice(0, MAX_METHODS), bases));
 }
+
+// The name of a method, or of a baseline.
+const nameOf = (row) => row.title ?? row.name;
 
 // How far a method is behind the first, how certain that is, and in how many tracks it loses frames.
 function behind(row) {
   const { digits, points } = D.score;
   const signed = (value) => `${value > 0 ? "+" : ""}${number(value, digits)}`;
-  const p = (value) => (value < 0.001 ? "p < 0.001" : `p = ${probability(value)}`);
+  const p = (value) => (value < D.constants.least_p ? `p ${probability(value)}` : `p = ${probability(value)}`);
   const ends = given(row.behind_low) ? ` (${signed(row.behind_low)} to ${signed(row.behind_high)})` : "";
   const lost = row.lost_tracks ? `lost in ${row.lost_tracks} of ${counted(row.runs, "track")}` : null;
   const effect = given(row.p) ? `${signed(row.behind)}${points}${ends}, ${p(row.p)}` : null;
@@ -54,7 +56,7 @@ function forest(width, rows, bases) {
   x.label = `${D.score.axis}${log ? ", on a logarithmic scale" : ""}; ${down ? "more" : "less"} is better`;
   const titles = [...rows, ...bases].map((row) => {
     const ends = given(row.low) ? ` from ${number(row.low, digits)} to ${number(row.high, digits)}` : "";
-    return `${row.name} ${number(row[of], digits)}${ends}`;
+    return `${nameOf(row)} ${number(row[of], digits)}${ends}`;
   });
   const top = 16 * bases.length + 10;
   const room = width - left - 4;
@@ -72,7 +74,7 @@ function forest(width, rows, bases) {
   const free = (value) => (value < from ? left - 9 : at(value));
   // a baseline's name is to the right of its line, in a separate row
   bases.forEach((row, k) => {
-    const [text, y] = [`${row.name} ${scored(row[of])}`, 16 * (bases.length - 1 - k)];
+    const [text, y] = [`${nameOf(row)} ${scored(row[of])}`, 16 * (bases.length - 1 - k)];
     const place = Math.min(at(row[of]) + 5, width - textWidth(text) - 4);
     svg.prepend(drawLine(at(row[of]), y + 2, at(row[of]), bottom, { class: "baseline" }));
     svg.append(drawText(place, y + 12, text, { class: "soft over" }));

@@ -4,8 +4,8 @@ const INSTANCES = D.instances.map((instance) => instance.name);
 const DASHES = ["", "7 3", "2 3", "8 3 2 3"];
 const FIRST_CURVES = 4; // methods in the charts at first
 const hidden = new Set();
-const colour = (m) => `var(--c${m % D.colours})`;
-const dash = (m) => DASHES[Math.floor(m / D.colours) % DASHES.length];
+const colour = (m) => `var(--c${m % D.constants.colours})`;
+const dash = (m) => DASHES[Math.floor(m / D.constants.colours) % DASHES.length];
 // A method's score with its unit, in a sentence or a figure.
 const scored = (value) => `${number(value, D.score.digits)}${D.score.unit}`;
 

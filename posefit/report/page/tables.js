@@ -1,6 +1,5 @@
 // Tables that any column sorts; leaderboard, all runs, running times, failures; the command that runs a cell again.
 const PAGE = 25; // rows
-const FEW = ["error_with_losses_degrees", "lost_rate", "seconds_per_frame"]; // figures of a run that need no button
 
 // A column: its title, `of` to sort by, a name in a row or a function of the row, and how a value is shown.
 const pick = (of) => (typeof of === "string" ? (row) => row[of] : of);
@@ -86,9 +85,9 @@ function table(box, columns, rows, { name, by = null, down = false, kind = () =>
 
 function leaderboard() {
   $("leaderboard-note").textContent = `${D.score.leaderboard}Click a column's title to sort by it.`;
-  const { name: score, digits, points, paired, down } = D.score;
+  const { name: score, digits, points, paired } = D.score;
   const bases = D.leaderboard[0].lost_tracks >= 0 ? D.baselines : [];
-  const name = (row) => row.name ?? `baseline: ${D.baseline_names[row.baseline]}`;
+  const name = (row) => (row.baseline ? `baseline: ${row.title}` : row.name);
   const settings = (row) => make("small", {}, D.methods[row.method].settings || "default settings");
   const method = (text, row) => (row.baseline ? text : [swatch(row.method), text, settings(row)]);
   const width = (row) => (given(row.low) ? row.high - row.low : null);
@@ -112,7 +111,7 @@ function leaderboard() {
     ),
   ];
   const kind = (row) => (row.baseline ? "base" : null);
-  table($("leaders"), columns, [...D.leaderboard, ...bases], { name: "Leaderboard", by: 1, down, kind });
+  table($("leaders"), columns, [...D.leaderboard, ...bases], { name: "Leaderboard", kind });
 }
 
 // The command that runs a row again, and a button for a command that needs no ledger.
@@ -121,7 +120,8 @@ function repeatButton(k) {
   const R = D.rows;
   const seed = D.seeds[R.seed[k]];
   const name = `${METHODS[R.method[k]]} on ${INSTANCES[R.instance[k]]}, seed ${seed}`;
-  const text = `${D.heads[R.head[k]]}instance = ${D.instances[R.instance[k]].number}\nseed = ${seed}\nEND`;
+  const { begin, methods, instances, end } = D.command;
+  const text = `${begin}${methods[R.method[k]]}${instances[R.instance[k]]}seed = ${seed}\n${end}`;
   return [rerun(R.key[k]), button("plan", () => showCommand(name, text), { title: "A command that needs no ledger" })];
 }
 
@@ -148,7 +148,7 @@ function allRows() {
     further(textColumn("settings", (k) => D.methods[R.method[k]].settings || "default")),
     textColumn("instance", of("instance"), (instance) => INSTANCES[instance]),
     column("seed", of("seed"), (seed) => String(D.seeds[seed])),
-    ...Object.keys(D.columns).map((name) => ({ ...figure(name, of(name)), more: !FEW.includes(name) })),
+    ...Object.keys(D.columns).map((name) => ({ ...figure(name, of(name)), more: !D.columns[name].brief })),
     buttonColumn("run again", repeatButton),
   ];
   const selects = [

@@ -13,15 +13,16 @@ from weakref import finalize
 from posefit.errors import InputError
 from posefit.progress import interactive
 from posefit.registry import register
-from posefit.report.write import leaderboard_lines, write_report
+from posefit.report.write import write_report
 from posefit.silhouette.sharing import cores
 from posefit.sweep.cell import run_cell
 from posefit.sweep.command import swept
 from posefit.sweep.drive import Tally
 from posefit.sweep.engine import Limits
-from posefit.sweep.ledger import FILE, Ledger
+from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
 from posefit.sweep.pool import Pool
+from posefit.sweep.schema import FILE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -75,15 +76,15 @@ class Comparison:
             path: The page, a file that ends in .html.
 
         Returns:
-            The report's data, as `posefit.report.write.write_report` returns them.
+            The data that `posefit report --json` prints.
 
         Raises:
             ValueError: The page cannot be written.
         """
-        return write_report(str(self.folder), str(path))
+        return write_report(str(self.folder), str(path)).data
 
     def __str__(self) -> str:
-        return "\n".join(leaderboard_lines(write_report(str(self.folder), None)))
+        return "\n".join(write_report(str(self.folder), None).lines)
 
     def __reduce__(self) -> tuple[Any, ...]:
         if not self._is_temporary:

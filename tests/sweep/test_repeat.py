@@ -12,10 +12,10 @@ from typing import Any
 
 import pytest
 
-from posefit.report.repeat import repeat_command
 from posefit.sweep.cell import run_cell
 from posefit.sweep.check import cell_of, search_of
 from posefit.sweep.plan import Plan
+from posefit.sweep.repeat import repeat_command
 from tests.commands import error_of, run
 from tests.report.browser import ledger
 from tests.sweep.fake import cells, rows_in
@@ -128,6 +128,17 @@ def test_a_row_is_run_again_by_the_first_digits_of_its_key(tmp_path: Path) -> No
     )
     (row,) = rows_in(tmp_path / "again")
     assert row["key"] == key
+
+
+@pytest.mark.parametrize("spec", [SEARCH, SMALL | SPECS[0]])
+def test_a_row_is_not_compared_with_itself(
+    spec: dict[str, Any], tmp_path: Path
+) -> None:
+    cell = search_of(spec) if "suite" in spec else cell_of(spec)
+    assert cell is not None
+    path = ledger(tmp_path / "results", [run_cell(cell)])
+    message = error_of("rerun", path, cell.key[:8], "--out", path)
+    assert "--out must be a new folder or a ledger without this cell" in message
 
 
 def test_differences_of_a_row_that_is_run_again_are_printed(tmp_path: Path) -> None:

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import posefit
+from posefit import comparison
 from posefit.motion.bvh import write_bvh
 from posefit.motion.clips import load_motion
 from posefit.registry import registry
-from posefit.report import comparison
 from posefit.sweep.engine import Outcome
 from tests.cases import each
 from tests.sweep.fake import Instant

@@ -17,11 +17,12 @@ from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
 from posefit.sweep.table import flat
 
-# These fields come last in a command. Rows that differ only in them share its head.
-LAST_FIELDS = ("instance", "seed")
 TIMES = ("seconds", "seconds_per_frame", "cpu_seconds_per_frame")
 MAX_SHOWN = 12  # the most differing figures that are listed
-_BEGIN = "posefit sweep - --out rerun <<'END'\n"
+# a command is one of these, the lines of a plan, and the end
+BEGIN = "posefit sweep - --out rerun <<'END'\n"
+TRACK_BEGIN = f"{BEGIN}[[cells]]\n"
+END = "END"
 # characters that JSON does not escape, but TOML or a terminal does not allow
 _ESCAPES = {code: f"\\u{code:04x}" for code in (*range(0x7F, 0xA0), 0x2028, 0x2029)}
 
@@ -39,8 +40,8 @@ def rerun(ledger: str | Path, key: str, out: str | Path | None = None) -> list[s
         are no lines if all else is equal.
 
     Raises:
-        ValueError: No row or several have the key, or the cell cannot be planned with
-            this version of posefit.
+        ValueError: No row or several have the key, the cell cannot be planned with this
+            version of posefit, or `out` has its row already.
         KeyboardInterrupt: It was stopped before the cell had ended.
     """
     earlier = _row_of(ledger, key)
@@ -51,6 +52,12 @@ def rerun(ledger: str | Path, key: str, out: str | Path | None = None) -> list[s
         tally = swept(plan, folder, start(), interactive().log, quiet=True)
         if tally.stopped:
             raise KeyboardInterrupt
+        # otherwise the earlier row would be compared with itself
+        if not (tally.ran or tally.failed):
+            raise InputError(
+                "--out must be a new folder or a ledger without this cell, "
+                f"got {folder}, which has it"
+            )
         (cell,) = plan
         with Ledger(folder) as results:
             now = next(row for row in results.all_rows() if row["key"] == cell.key)
@@ -107,12 +114,10 @@ def _differences(earlier: Mapping[str, Any], now: Mapping[str, Any]) -> list[str
 def plan_tables(spec: Mapping[str, Any]) -> dict[str, Any]:
     """Return the tables of a plan whose only cell has this spec."""
     if spec["kind"] == "track":
-        last = {name: spec[name] for name in LAST_FIELDS}
-        return {"cells": [{**_track_fields(spec), **last}]}
-    method = {"method": spec["method"]}
+        return {"cells": [track_fields(spec)]}
+    method = {"method": spec["method"], "settings": spec["settings"]}
     if spec["name"]:
         method["name"] = spec["name"]
-    method["settings"] = spec["settings"]
     return {
         "suite": spec["suite"],
         "methods": [method],
@@ -125,6 +130,18 @@ def plan_tables(spec: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
+def track_fields(spec: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a plan's cell that a spec, or a part of one, has."""
+    fields = {name: spec[name] for name in FIELDS if name in spec}
+    if not fields.get("name", True):
+        del fields["name"]
+    # TOML has no null, so write settings as texts, which are parsed when they are read
+    if "settings" in fields:
+        settings = fields["settings"].items()
+        fields["settings"] = {name: setting_text(value) for name, value in settings}
+    return fields
+
+
 def repeat_command(spec: Mapping[str, Any]) -> str:
     """Return a shell command that runs a spec's cell again, into the folder `rerun`.
 
@@ -132,33 +149,12 @@ def repeat_command(spec: Mapping[str, Any]) -> str:
     lines begins with a field's name, so no value can end it.
     """
     if spec["kind"] == "track":
-        last = {name: spec[name] for name in LAST_FIELDS}
-        return f"{command_head(spec)}{_lines(last)}END"
-    return f"{_BEGIN}{_lines(plan_tables(spec))}END"
+        return f"{TRACK_BEGIN}{plan_lines(track_fields(spec))}{END}"
+    return f"{BEGIN}{plan_lines(plan_tables(spec))}{END}"
 
 
-def command_head(spec: Mapping[str, Any]) -> str:
-    """Return a track's command before the lines of `LAST_FIELDS` and `END`."""
-    return f"{_BEGIN}[[cells]]\n{_lines(_track_fields(spec))}"
-
-
-def _track_fields(spec: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of a track's cell in a plan, except `LAST_FIELDS`."""
-    fields = {}
-    for name in FIELDS:
-        if name in spec and name not in LAST_FIELDS:
-            fields[name] = spec[name]
-    if not fields.get("name", True):
-        del fields["name"]
-    # TOML has no null, so write settings as texts, which are parsed when they are read
-    settings = {}
-    for name, value in spec["settings"].items():
-        settings[name] = setting_text(value)
-    fields["settings"] = settings
-    return fields
-
-
-def _lines(fields: Mapping[str, Any]) -> str:
+def plan_lines(fields: Mapping[str, Any]) -> str:
+    """Return a line of TOML for each field."""
     return "".join(f"{name} = {_toml(value)}\n" for name, value in fields.items())
 
 

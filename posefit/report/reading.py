@@ -1,0 +1,358 @@
+"""Reads the finished rows of a ledger into arrays, which hold a million."""
+
+from array import array
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.errors import InputError, printable
+from posefit.reading import quoted, suggestion
+from posefit.report.columns import listed
+from posefit.report.contest import Failure, Kind, Row, Runs
+from posefit.report.names import distinct
+from posefit.report.searches import SEARCHES
+from posefit.report.stored import Ordered, Store
+from posefit.report.tracks import TRACKS
+from posefit.settings import setting_text
+from posefit.sweep.cell import cell_from, json_of, other_version
+from posefit.sweep.repeat import repeat_command
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from posefit.sweep.ledger import Ledger
+
+KINDS: dict[str, Kind] = {kind.name: kind for kind in (TRACKS, SEARCHES)}
+KEY_LENGTH = 8  # characters of a key that distinguish runs on a page
+# the fields that define a method; all others except the seed define an instance
+METHOD_FIELDS = (
+    "method",
+    "name",
+    "settings",
+    "evaluations",
+    "hypotheses",
+    "infeasible",
+    "version",
+)
+
+
+class _Distinct:
+    """Distinct values, numbered in the order in which they are added."""
+
+    def __init__(self) -> None:
+        self.values: list[dict[str, Any]] = []
+        self._numbers: dict[str, int] = {}
+
+    def number(self, value: dict[str, Any]) -> int:
+        """Return the number of a value, and add it if it is new."""
+        key = json_of(value)
+        if key not in self._numbers:
+            self._numbers[key] = len(self.values)
+            self.values.append(value)
+        return self._numbers[key]
+
+
+class _Finished:
+    """The finished rows of one kind, in the order in which they are added.
+
+    Their values are in arrays, because objects for a million rows would fill the
+    memory.
+    """
+
+    def __init__(self, kind: Kind) -> None:
+        self.place = array("q")
+        self.method = array("q")
+        self.seed = array("q")  # its place in `seeds`
+        self.seeds: dict[int, int] = {}  # in their order, of any size
+        self.keys = bytearray()  # eight characters each
+        self.warnings: dict[int, tuple[str, ...]] = {}  # by the row's index
+        self.figures = {name: array("d") for name in kind.columns}
+        self.data: dict[str, Store] = {}
+        for name, store in kind.data.items():
+            self.data[name] = store()
+
+    def add(
+        self, row: Row, place: int, method: int, figures: Array, data: dict[str, Any]
+    ) -> None:
+        """Add a row with the numbers of its instance and method.
+
+        Args:
+            row: The row.
+            place: The number of its instance.
+            method: The number of its method.
+            figures: Its figures.
+            data: Its other data by name.
+        """
+        if warnings := tuple(map(printable, row["warnings"])):
+            self.warnings[len(self.method)] = warnings
+        for column, figure in zip(self.figures.values(), figures.tolist(), strict=True):
+            column.append(figure)
+        for name, store in self.data.items():
+            store.append(data[name])
+        self.place.append(place)
+        self.method.append(method)
+        seed = int(row["spec"]["seed"])
+        self.seed.append(self.seeds.setdefault(seed, len(self.seeds)))
+        key = row["key"].encode("ascii", "replace")
+        self.keys += key[:KEY_LENGTH].ljust(KEY_LENGTH, b"\0")
+
+
+class _Rows(NamedTuple):
+    """The rows of a ledger in its order."""
+
+    kind: Kind
+    variants: list[dict[str, Any]]  # the fields that define each method
+    places: list[dict[str, Any]]  # the fields that define each instance
+    finished: _Finished
+    # each quarantined cell with the number of its method
+    quarantined: list[tuple[int, Row]]
+
+
+def runs_of(
+    ledger: "Ledger", methods: Sequence[str] = (), *, latest: bool = False
+) -> Runs:
+    """Return the finished rows of a ledger.
+
+    Their order does not depend on which of them finished first.
+
+    Args:
+        ledger: An open ledger, of tracks or of single searches.
+        methods: The methods whose runs are returned, by their names in the report or in
+            the plan. All if empty.
+        latest: Whether to return only one version of each method: the installed
+            version, or else the one planned last.
+
+    Returns:
+        The runs, and the failures. If every cell failed, there are no runs.
+
+    Raises:
+        ValueError: The ledger has neither a row nor a failure, or both tracks and
+            single searches, or no method has one of the names.
+    """
+    rows = _read(ledger)
+    kind = rows.kind
+    label_of = _labels(rows, latest)
+    chosen = _named(methods, label_of, rows) if methods else list(label_of)
+    table = rows.finished
+    method_of_row = np.array(table.method, dtype=np.int64)
+    having_rows = set(np.unique(method_of_row).tolist())
+    finished = [m for m in chosen if m in having_rows]
+
+    # the rows of these methods, sorted by instance, method and seed
+    numbers = np.flatnonzero(np.isin(method_of_row, finished))
+    place_of_row = np.array(table.place, dtype=np.int64)[numbers]
+    seed_of_row = np.array(table.seed, dtype=np.int64)[numbers]
+    place_order = sorted(
+        np.unique(place_of_row).tolist(),
+        key=lambda i: (kind.rank(rows.places[i]), json_of(rows.places[i])),
+    )
+    seeds = list(table.seeds)
+    seed_order = sorted(np.unique(seed_of_row).tolist(), key=seeds.__getitem__)
+    instance = _ranks(place_of_row, place_order)
+    method = _ranks(method_of_row[numbers], finished)
+    seed = _ranks(seed_of_row, seed_order)
+    order = np.lexsort((seed, method, instance))
+    numbers = numbers[order]
+
+    figures = {}
+    for name in kind.columns:
+        # one at a time, because two copies of all take much memory
+        figures[name] = np.array(table.figures.pop(name), dtype=np.float64)[numbers]
+    data = {}
+    for name, store in table.data.items():
+        data[name] = Ordered[Any](store, numbers)
+    warnings = {}
+    if table.warnings:
+        for k, number in enumerate(numbers.tolist()):
+            if number in table.warnings:
+                warnings[k] = table.warnings[number]
+    failures = []
+    for m, cell in rows.quarantined:
+        if m in chosen:
+            failures.append(_failure(cell, label_of[m]))
+    places = [rows.places[i] for i in place_order]
+    return Runs(
+        kind=kind,
+        version=ledger.version,
+        methods=tuple(label_of[m] for m in finished),
+        variants=tuple(rows.variants[m] for m in finished),
+        instances=_instance_names(kind, places),
+        places=tuple(places),
+        method=method[order],
+        instance=instance[order],
+        seed=seed[order],
+        seeds=tuple(seeds[k] for k in seed_order),
+        keys=np.frombuffer(table.keys, f"S{KEY_LENGTH}")[numbers],
+        figures=figures,
+        data=data,
+        warnings=warnings,
+        failures=tuple(failures),
+    )
+
+
+def _ranks(values: "NDArray[np.int64]", order: Sequence[int]) -> Array:
+    """Return the places of values (n,) in an order of all that occur."""
+    rank = np.zeros(max(order, default=-1) + 1, dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    return np.asarray(rank[values])
+
+
+def _read(ledger: "Ledger") -> _Rows:
+    """Return the rows of a ledger.
+
+    Raises InputError if it has no row, finished or quarantined, or has both tracks and
+    searches.
+    """
+    variants = _Distinct()
+    places = _Distinct()
+    finished: _Finished | None = None
+    quarantined = list[tuple[int, Row]]()
+    kinds = set[str]()
+    for row in ledger.all_rows():
+        spec = row["spec"]
+        kinds.add(spec["kind"])
+        if len(kinds) > 1:
+            raise InputError(
+                f"{ledger.path}: expected a ledger of either tracks or single "
+                "searches, got both"
+            )
+        kind = KINDS[spec["kind"]]
+        if finished is None:
+            finished = _Finished(kind)
+        try:
+            method = variants.number(_variant(spec))
+            if row["status"] != "done":
+                quarantined.append((method, row))
+                continue
+            figures, data = kind.read(row)
+            finished.add(row, places.number(_place(spec)), method, figures, data)
+        # raised if a value is missing or has another type
+        except (ValueError, TypeError, LookupError, AttributeError) as error:
+            raise ledger.damaged_row(row["key"], error) from None
+    if finished is None:
+        raise InputError(
+            f"{ledger.path}: expected a ledger with finished rows, got none"
+        )
+    return _Rows(kind, variants.values, places.values, finished, quarantined)
+
+
+def _labels(rows: _Rows, latest: bool) -> dict[int, str]:
+    """Return the distinct names of methods by their numbers, the best first.
+
+    Methods that only failed are last.
+    """
+    variants = rows.variants
+    score = rows.kind.score
+    scores = np.array(rows.finished.figures[score.name], dtype=np.float64)
+    badness = np.nan_to_num(-scores if score.down else scores, nan=np.inf)
+    method = np.array(rows.finished.method, dtype=np.int64)
+
+    def order(m: int) -> tuple[bool, float, str]:
+        """Return a key that is lower for better methods."""
+        own = badness[method == m]
+        mean = float(own.mean()) if len(own) else 0.0
+        return not len(own), mean, json_of(variants[m])
+
+    best_first = sorted(
+        _latest(variants) if latest else range(len(variants)), key=order
+    )
+    names = distinct(
+        [_planned_name(variants[m]) for m in best_first],
+        [_variation(variants[m]) for m in best_first],
+    )
+    return dict(zip(best_first, names, strict=True))
+
+
+def _instance_names(kind: Kind, places: Sequence[dict[str, Any]]) -> tuple[str, ...]:
+    """Return the distinct names of instances."""
+    details = []
+    for place in places:
+        texts = {}
+        for name, value in place.items():
+            texts[name] = value if isinstance(value, str) else json_of(value)
+        details.append(texts)
+    return distinct([kind.place_name(place) for place in places], details)
+
+
+def _latest(variants: Sequence[Mapping[str, Any]]) -> list[int]:
+    """Return one version of each method, by their indices.
+
+    It is the installed version, or else the one planned last.
+    """
+    best: dict[str, tuple[bool, int]] = {}
+    for m, variant in enumerate(variants):
+        versions = variant["version"].split(", ")
+        installed = not any(map(other_version, versions))
+        key = json_of({**variant, "version": ""})
+        best[key] = max(best.get(key, (False, -1)), (installed, m))
+    return sorted(m for _, m in best.values())
+
+
+def _named(names: Sequence[str], label_of: Mapping[int, str], rows: _Rows) -> list[int]:
+    """Return the methods with the given names, in the order of their labels.
+
+    Raises InputError if no method has one of the names.
+    """
+    names_of = {}
+    for m, label in label_of.items():
+        names_of[m] = {label, _planned_name(rows.variants[m])}
+    known = set().union(*names_of.values())
+    for name in names:
+        if name not in known:
+            raise InputError(
+                f"--methods must be of {listed(sorted(label_of.values()), 12)}, "
+                f"got {quoted(name)}{suggestion(name, known)}"
+            )
+    return [m for m in label_of if names_of[m] & set(names)]
+
+
+def _planned_name(variant: Mapping[str, Any]) -> str:
+    """Return a method's name in the plan."""
+    return str(variant["name"] or variant["method"])
+
+
+def _failure(cell: Mapping[str, Any], name: str) -> Failure:
+    """Return a quarantined cell of a method with this name."""
+    return Failure(
+        name=printable(str(cell_from({**cell["spec"], "name": name}))),
+        method=name,
+        key=cell["key"][:8],
+        reasons=tuple(map(printable, dict.fromkeys(cell["reasons"]))),
+        command=repeat_command(cell["spec"]),
+    )
+
+
+def _variant(spec: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields that define a method.
+
+    Searches have a budget per dimension instead of their evaluations.
+    """
+    fields = {name: spec[name] for name in METHOD_FIELDS if name in spec}
+    fields["settings"] = dict(sorted(spec["settings"].items()))
+    if "dimension" in spec:
+        fields["budget"] = fields.pop("evaluations") / spec["dimension"]
+    return fields
+
+
+def _variation(variant: Mapping[str, Any]) -> dict[str, str]:
+    """Return the texts that may distinguish a method from others of the same name."""
+    texts = {name: setting_text(value) for name, value in variant["settings"].items()}
+    for name in ("method", "evaluations", "budget", "hypotheses", "infeasible"):
+        if name in variant:
+            value = variant[name]
+            texts[name] = value if isinstance(value, str) else f"{value:.12g}"
+    for part in variant["version"].split(", "):
+        name, _, version = part.partition(" ")
+        texts[name] = version
+    return texts
+
+
+def _place(spec: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields that define an instance."""
+    fields = {}
+    for name, value in spec.items():
+        if name not in (*METHOD_FIELDS, "kind", "seed"):
+            fields[name] = value
+    return fields
