@@ -31,6 +31,7 @@ from posefit.footage.views import (
     empty_planes,
     full_planes,
     known_planes,
+    release,
     span,
     times_of,
 )
@@ -91,6 +92,7 @@ def read_annotations(
                 known = full_planes(len(files), size) if known is None else known
                 known[k] = np.packbits(mask | ~crowd)
         bits[k] = np.packbits(mask)
+        release(bits, k)
     check_some(str(path), there, start)
     numbers = np.arange(start, stop)
     return View(

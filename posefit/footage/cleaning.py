@@ -14,6 +14,7 @@ from posefit.footage.views import (
     border_of,
     empty_planes,
     full_planes,
+    release,
     unpacked,
 )
 from posefit.motion.clips import FPS
@@ -21,6 +22,7 @@ from posefit.silhouette.foreground import MAX_HOLE_AREA, without_holes
 from posefit.silhouette.mask import Mask, Silhouette, touches_border
 from posefit.silhouette.pieces import people_in
 
+BORDERS = 500  # frames whose borders are looked at together
 # share of the person's area: the largest hole that is filled if there is one mask only.
 # A hole between an arm and the trunk shows where the arm is, and no other frame does
 MAX_HOLE_ALONE = 0.0005
@@ -69,6 +71,7 @@ def cleaned(
 
     def put(k: int, mask: Mask) -> None:
         bits[k] = np.packbits(mask)
+        release(bits, k)
         areas[k] = mask.sum()
         cut[k] = usable[k] and touches_border(mask)
 
@@ -90,6 +93,7 @@ def cleaned(
             mask, valid = planes_of(parts, others, k, unpacked(before[k], view.size))
             put(k, without_holes(mask, holes) & valid)
             known[k] = np.packbits(valid)
+            release(known, k)
     usable = usable & (areas > 0)
     return replace(
         view,
@@ -146,9 +150,15 @@ def _is_inverted(view: View) -> bool:
     shows = view.shows
     if not shows.any():
         return False
-    marked = border_of(view.bits, view.size)
-    known = np.ones_like(marked)
-    if view.known is not None:
-        known = border_of(view.known, view.size)
-    covered = (marked & known).sum(axis=1) > MOST * known.sum(axis=1)
+    covered = np.empty(len(view), dtype=bool)
+    # a piece at a time, because the borders of a long film need much memory
+    for first in range(0, len(view), BORDERS):
+        piece = slice(first, first + BORDERS)
+        marked = border_of(view.bits[piece], view.size)
+        release(view.bits, first, BORDERS)
+        known = np.ones_like(marked)
+        if view.known is not None:
+            known = border_of(view.known[piece], view.size)
+            release(view.known, first, BORDERS)
+        covered[piece] = (marked & known).sum(axis=1) > MOST * known.sum(axis=1)
     return bool(np.mean(covered[shows]) > MOST)

@@ -32,6 +32,7 @@ from posefit.footage.views import (
     check_some,
     empty_planes,
     known_planes,
+    release,
     span,
     times_of,
 )
@@ -347,4 +348,5 @@ def _pack(
     planes = empty_planes(count, size)
     for k, marks in enumerate(frames):
         planes[k] = np.packbits(is_person(marks.values))
+        release(planes, k)
     return planes

@@ -20,7 +20,7 @@ from posefit.footage.people import (
 from posefit.footage.quality import FrameQuality
 from posefit.footage.segmenter import PersonSegmenter, SegmentedFrame
 from posefit.footage.video import Video, ahead
-from posefit.footage.views import Range, View, empty_planes, span, times_of
+from posefit.footage.views import Range, View, empty_planes, release, span, times_of
 from posefit.silhouette.foreground import Image, Person
 from posefit.silhouette.mask import touches_border
 
@@ -102,6 +102,8 @@ class Scanner:
             landmarks.append(points)
             bits[k] = np.packbits(blobs[0].mask)
             known[k] = np.packbits(blobs[0].valid)
+            release(bits, k)
+            release(known, k)
             present = people.add([blob.mask for blob in blobs if blob.area], image)
             rows.add(k, image, blobs, people, present)
         count = len(rows.blanks)  # the file may break off

@@ -17,7 +17,7 @@ from posefit.footage.people import Chooser, planes_of, rows_of
 from posefit.footage.quality import Verdict, advice, verdict
 from posefit.footage.scanner import Progress, Scan, Scanner
 from posefit.footage.video import Video
-from posefit.footage.views import Range, View
+from posefit.footage.views import Range, View, empty_planes, release
 
 MISSING = 0.02  # share of a file's frames that may be missing without a warning
 DAMAGED = (
@@ -158,13 +158,15 @@ class Segmentation:
         if not several:
             return _Followed(scan.view, several, scan.largest, scan.largest)
         others = scan.people.others(parts)
-        bits = np.empty_like(scan.view.bits)
-        known = np.empty_like(scan.view.bits)
+        bits = empty_planes(len(scan.view), scan.view.size)
+        known = empty_planes(len(scan.view), scan.view.size)
         for k in range(len(scan.blanks)):
             shown = scan.view.silhouette(k).valid
             mask, valid = planes_of(parts, others, k, shown)
             bits[k] = np.packbits(mask)
             known[k] = np.packbits(valid)
+            release(bits, k)
+            release(known, k)
         view = replace(scan.view, bits=bits, known=known)
         return _Followed(view, several, *rows_of(parts, scan.blanks))
 

@@ -7,6 +7,7 @@ from posefit.footage.source import views_of_masks
 print(view.numbers[view.usable], view.silhouette(0).mask.shape)
 """
 
+import mmap
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -31,6 +32,7 @@ Range = tuple[int | None, int | None]
 Planes = NDArray[np.uint8]
 # masks of one camera that are held in memory
 PLANES_BYTES = 128_000_000
+READ_AROUND = 65_536  # bytes before and after a page that Linux maps with it
 # the fields of a `View` with one row per frame; some may be None
 PER_FRAME = ("numbers", "times", "bits", "known", "usable", "landmarks", "facings")
 
@@ -91,13 +93,20 @@ class View:
 
     def silhouette(self, k: int) -> Silhouette:
         """Decode and return the silhouette of frame k, counted from 0."""
-        known = None if self.known is None else unpacked(self.known[k], self.size)
-        return Silhouette.of(unpacked(self.bits[k], self.size), known)
+        known = None
+        if self.known is not None:
+            known = unpacked(self.known[k], self.size)
+            release(self.known, k)
+        mask = unpacked(self.bits[k], self.size)
+        release(self.bits, k)
+        return Silhouette.of(mask, known)
 
     def masks(self) -> Iterator[Mask]:
         """Decode and yield the mask of each frame."""
-        for bits in self.bits:
-            yield unpacked(bits, self.size)
+        for k, bits in enumerate(self.bits):
+            mask = unpacked(bits, self.size)
+            release(self.bits, k)
+            yield mask
 
     @property
     def shows(self) -> NDArray[np.bool_]:
@@ -109,6 +118,9 @@ class View:
             known = every if self.known is None else self.known[k]
             bits = frame & known
             shows[k] = bits.any() and (bits != known).any()
+            release(self.bits, k)
+            if self.known is not None:
+                release(self.known, k)
         return shows
 
 
@@ -196,8 +208,8 @@ def border_of(planes: Planes, size: tuple[int, int]) -> NDArray[np.bool_]:
 def empty_planes(count: int, size: tuple[int, int]) -> Planes:
     """Return uninitialised planes for `count` masks.
 
-    More than `PLANES_BYTES` are in a temporary file without a name, of which the
-    operating system keeps in memory what there is room for.
+    More than `PLANES_BYTES` are in a temporary file without a name. Whoever reads or
+    writes a frame of them calls `release` afterwards.
 
     Raises:
         InputError: The planes need more memory than this process may use.
@@ -222,10 +234,31 @@ def empty_planes(count: int, size: tuple[int, int]) -> Planes:
         return np.empty((count, octets), dtype=np.uint8)
 
 
+def release(planes: Planes, k: int, count: int = 1) -> None:
+    """Take some planes from frame k on out of memory if they are in a file.
+
+    Otherwise all planes that were ever read or written would count as memory of this
+    process. Nothing is lost, and the operating system keeps what it has room for.
+    """
+    mapped = getattr(planes, "_mmap", None)
+    if mapped is None or not hasattr(mmap, "MADV_DONTNEED"):
+        return
+    # a slice of planes begins later in the file than the planes
+    before = np.frombuffer(mapped, np.uint8, 1).ctypes.data
+    start = planes[k].ctypes.data - before
+    # to read one page brings its neighbours too
+    first = max(start - READ_AROUND, 0) // mmap.PAGESIZE * mmap.PAGESIZE
+    last = min(start + count * planes.shape[1] + READ_AROUND, len(mapped))
+    mapped.madvise(mmap.MADV_DONTNEED, first, last - first)
+
+
 def full_planes(count: int, size: tuple[int, int]) -> Planes:
     """Return planes of `count` masks in which every pixel is set."""
     planes = empty_planes(count, size)
-    planes[:] = np.packbits(np.ones(size[0] * size[1], dtype=bool))
+    every = np.packbits(np.ones(size[0] * size[1], dtype=bool))
+    for k in range(count):
+        planes[k] = every
+        release(planes, k)
     return planes
 
 

@@ -4,13 +4,14 @@ It makes no network request.
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib.resources import files
 from typing import Any
 
 import numpy as np
 
 PART = "<!--part-->"  # replaced in the markup by style, data and script
+PIECE = 10_000  # numbers of an array that are converted together
 SHARED = ("base", "chart")  # scripts of every page, in this order
 _UNSAFE = {ord(sign): f"\\u{ord(sign):04x}" for sign in "<>&\u2028\u2029"}
 
@@ -20,8 +21,10 @@ def part(package: str, name: str) -> str:
     return (files(package) / name).read_text(encoding="utf-8")
 
 
-def assembled(mark: str, markup: str, style: str, data: Any, script: str) -> str:
-    """Return a document with style, data and script in its markup.
+def assembled(
+    mark: str, markup: str, style: str, data: Any, script: str
+) -> Iterator[str]:
+    """Yield the parts of a document with style, data and script in its markup.
 
     Args:
         mark: the document's first line.
@@ -33,12 +36,12 @@ def assembled(mark: str, markup: str, style: str, data: Any, script: str) -> str
     head = part(__package__, "head.html")
     before, middle, after, end = f"{head}{markup}".split(PART)
     style_element = f"<style>\n{part(__package__, 'base.css')}{style}</style>"
-    json_element = (
-        f'<script type="application/json" id="data">{embedded(data)}</script>'
-    )
-    script_element = f"<script>\n{script}</script>"
-    parts = [mark, before, style_element, middle, json_element, after]
-    return "".join([*parts, script_element, end])
+    yield from (mark, before, style_element, middle)
+    yield '<script type="application/json" id="data">'
+    for text in _json(data):
+        yield text.translate(_UNSAFE)
+    yield "</script>"
+    yield from (after, f"<script>\n{script}</script>", end)
 
 
 def one_script(package: str, names: Sequence[str]) -> str:
@@ -56,21 +59,31 @@ def embedded(value: Any) -> str:
 
     Nan and infinities are null.
     """
-    return _json(value).translate(_UNSAFE)
+    return "".join(_json(value)).translate(_UNSAFE)
 
 
-def _json(value: Any) -> str:
-    """Return a value as JSON.
+def _json(value: Any) -> Iterator[str]:
+    """Yield the parts of a value's JSON.
 
-    Each part of a dictionary is converted separately, because all numbers of a page as
-    Python objects take much memory.
+    Dictionaries and long arrays are converted a part at a time, because all numbers of
+    a page as Python objects, or as one text, take much memory.
     """
     if isinstance(value, dict):
-        items = []
+        begin = "{"
         for name, inner in value.items():
-            items.append(f"{json.dumps(str(name))}:{_json(inner)}")
-        return f"{{{','.join(items)}}}"
-    return json.dumps(plain(value), allow_nan=False, separators=(",", ":"))
+            yield f"{begin}{json.dumps(str(name))}:"
+            yield from _json(inner)
+            begin = ","
+        yield "}" if value else "{}"
+    elif isinstance(value, np.ndarray) and value.ndim == 1 and len(value) > PIECE:
+        begin = "["
+        for first in range(0, len(value), PIECE):
+            (piece,) = _json(value[first : first + PIECE])
+            yield f"{begin}{piece[1:-1]}"
+            begin = ","
+        yield "]"
+    else:
+        yield json.dumps(plain(value), allow_nan=False, separators=(",", ":"))
 
 
 def plain(value: Any) -> Any:

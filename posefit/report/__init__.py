@@ -15,6 +15,7 @@ r"""The report of a ledger: a page for any browser, figures for papers, and tabl
 | the steps of the command, and its checks | write.py |
 | the runs of a ledger, their kind, and those that methods share | contest.py |
 | reading the rows of a ledger | reading.py |
+| what a row has besides figures, for a million rows | stored.py |
 | distinct names of methods and instances | names.py |
 | what differs between tracks and single searches | tracks.py, searches.py |
 | figures and the score: names, digits, averages, texts | columns.py |

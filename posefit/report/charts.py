@@ -101,12 +101,15 @@ def grid(contest: Contest) -> Array:
 
     They span all traces of the contest.
     """
-    traces: list[Trace] = contest.data("traces", contest.blocks)
-    used = [used for used, _ in traces if len(used)]
-    if not used:
+    traces: Sequence[Trace] = contest.data("traces", contest.blocks)
+    least = np.inf
+    most = 0.0
+    for used, _ in traces:
+        if len(used):
+            least = min(least, used[0])
+            most = max(most, used[-1])
+    if not most:
         return np.empty(0)
-    least = min(map(np.min, used))
-    most = max(map(np.max, used))
     return np.unique(np.rint(np.geomspace(least, most, POINTS)))
 
 
@@ -124,7 +127,7 @@ def convergence(contest: Contest, evaluations: Array) -> list[Line | None]:
     """
 
     def line(place: int, rows: Array) -> Line | None:
-        traces: list[Trace] = contest.data("traces", rows)
+        traces: Sequence[Trace] = contest.data("traces", rows)
         if not all(len(used) for used, _ in traces):
             return None
         first = max(used[0] for used, _ in traces)

@@ -5,7 +5,7 @@ differs between these two. A `Contest` has the runs that the methods share.
 """
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.errors import printable
 from posefit.report.columns import Column, Score
+from posefit.report.stored import Ordered, Store
 from posefit.settings import settings_text
 from posefit.statistics.means import Intervals, block_means
 from posefit.statistics.paired import PairedTest, paired_tests
@@ -59,6 +60,7 @@ class Kind(Protocol):
         title: The title of the page.
         columns: Its figures by name.
         score: The figure that orders the methods.
+        data: What stores a row's other data, by their names.
     """
 
     name: str
@@ -66,18 +68,14 @@ class Kind(Protocol):
     title: str
     columns: Mapping[str, Column]
     score: Score
+    data: Mapping[str, Callable[[], Store]]
 
     def computed(self, row: Row, /) -> dict[str, float]:
         """Return the figures that a row of a ledger does not have itself."""
         ...
 
-    def read(
-        self, row: Row, shared: dict[bytes, Any], /
-    ) -> tuple[Array, dict[str, Any]]:
-        """Return the figures of a row, and its other data by name.
-
-        `shared` holds arrays that many rows have in common, to save memory.
-        """
+    def read(self, row: Row, /) -> tuple[Array, dict[str, Any]]:
+        """Return the figures of a row, and its other data by the names of `data`."""
         ...
 
     def rank(self, place: Place) -> tuple[Any, ...]:
@@ -164,9 +162,9 @@ class Runs:
         instance: The index (n,) of each row's instance.
         seed: The index (n,) of each row's seed.
         seeds: The seeds, rising.
-        keys: The key of each row.
+        keys: The first eight characters of each row's key (n,).
         figures: Each figure (n,) by name, nan if a row does not have it.
-        data: The other data of each row by name, see `Kind.read`.
+        data: The other data of each row, by the names of `Kind.data`.
         warnings: The warnings of each row that has some, by its index.
         failures: The quarantined cells.
     """
@@ -181,7 +179,7 @@ class Runs:
     instance: Array
     seed: Array
     seeds: tuple[int, ...]
-    keys: tuple[str, ...]
+    keys: NDArray[np.bytes_]
     figures: dict[str, Array]
     data: Mapping[str, Sequence[Any]]
     warnings: Mapping[int, tuple[str, ...]]
@@ -252,10 +250,9 @@ class Contest(Shared):
         """The figure (methods, blocks) that orders the methods."""
         return self.of(self.runs.kind.score.name)
 
-    def data(self, name: str, rows: Array | NDArray[np.int64]) -> list[Any]:
+    def data(self, name: str, rows: Array | NDArray[np.int64]) -> Sequence[Any]:
         """Return the other data of rows, which are indices of any shape, in order."""
-        data = self.runs.data[name]
-        return [data[k] for k in map(int, rows.ravel())]
+        return Ordered(self.runs.data[name], rows.ravel().astype(np.int64))
 
     def rows_of(self, method: int) -> NDArray[np.int64]:
         """Return the indices (k,) of the runs on which a method's figures are averaged.

@@ -1,5 +1,6 @@
-"""Reads the finished rows of a ledger into arrays, which hold a hundred thousand."""
+"""Reads the finished rows of a ledger into arrays, which hold a million."""
 
+from array import array
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -9,18 +10,22 @@ from posefit.arrays import Array
 from posefit.errors import InputError, printable
 from posefit.reading import quoted, suggestion
 from posefit.report.columns import listed
-from posefit.report.contest import Failure, Kind, Runs
+from posefit.report.contest import Failure, Kind, Row, Runs
 from posefit.report.names import distinct
 from posefit.report.searches import SEARCHES
+from posefit.report.stored import Ordered, Store
 from posefit.report.tracks import TRACKS
 from posefit.settings import setting_text
 from posefit.sweep.cell import cell_from, json_of, other_version
 from posefit.sweep.repeat import repeat_command
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from posefit.sweep.ledger import Ledger
 
 KINDS: dict[str, Kind] = {kind.name: kind for kind in (TRACKS, SEARCHES)}
+KEY_LENGTH = 8  # characters of a key that distinguish runs on a page
 # the fields that define a method; all others except the seed define an instance
 METHOD_FIELDS = (
     "method",
@@ -49,16 +54,49 @@ class _Distinct:
         return self._numbers[key]
 
 
-class _Run(NamedTuple):
-    """A finished row, with the numbers of its instance and method."""
+class _Finished:
+    """The finished rows of one kind, in the order in which they are added.
 
-    place: int
-    method: int
-    seed: int  # of any size
-    key: str
-    warnings: tuple[str, ...]
-    figures: Array
-    data: Mapping[str, Any]
+    Their values are in arrays, because objects for a million rows would fill the
+    memory.
+    """
+
+    def __init__(self, kind: Kind) -> None:
+        self.place = array("q")
+        self.method = array("q")
+        self.seed = array("q")  # its place in `seeds`
+        self.seeds: dict[int, int] = {}  # in their order, of any size
+        self.keys = bytearray()  # eight characters each
+        self.warnings: dict[int, tuple[str, ...]] = {}  # by the row's index
+        self.figures = {name: array("d") for name in kind.columns}
+        self.data: dict[str, Store] = {}
+        for name, store in kind.data.items():
+            self.data[name] = store()
+
+    def add(
+        self, row: Row, place: int, method: int, figures: Array, data: dict[str, Any]
+    ) -> None:
+        """Add a row with the numbers of its instance and method.
+
+        Args:
+            row: The row.
+            place: The number of its instance.
+            method: The number of its method.
+            figures: Its figures.
+            data: Its other data by name.
+        """
+        if warnings := tuple(map(printable, row["warnings"])):
+            self.warnings[len(self.method)] = warnings
+        for column, figure in zip(self.figures.values(), figures.tolist(), strict=True):
+            column.append(figure)
+        for name, store in self.data.items():
+            store.append(data[name])
+        self.place.append(place)
+        self.method.append(method)
+        seed = int(row["spec"]["seed"])
+        self.seed.append(self.seeds.setdefault(seed, len(self.seeds)))
+        key = row["key"].encode("ascii", "replace")
+        self.keys += key[:KEY_LENGTH].ljust(KEY_LENGTH, b"\0")
 
 
 class _Rows(NamedTuple):
@@ -67,14 +105,9 @@ class _Rows(NamedTuple):
     kind: Kind
     variants: list[dict[str, Any]]  # the fields that define each method
     places: list[dict[str, Any]]  # the fields that define each instance
-    runs: list[_Run]
+    finished: _Finished
     # each quarantined cell with the number of its method
-    quarantined: list[tuple[int, Mapping[str, Any]]]
-
-    @property
-    def finished(self) -> set[int]:
-        """The numbers of the methods with a finished row."""
-        return {run.method for run in self.runs}
+    quarantined: list[tuple[int, Row]]
 
 
 def runs_of(
@@ -102,43 +135,68 @@ def runs_of(
     kind = rows.kind
     label_of = _labels(rows, latest)
     chosen = _named(methods, label_of, rows) if methods else list(label_of)
-    finished = rows.finished
-    method_of = {m: k for k, m in enumerate(m for m in chosen if m in finished)}
-    runs = [run for run in rows.runs if run.method in method_of]
-    numbers = sorted(
-        {run.place for run in runs},
+    table = rows.finished
+    method_of_row = np.array(table.method, dtype=np.int64)
+    having_rows = set(np.unique(method_of_row).tolist())
+    finished = [m for m in chosen if m in having_rows]
+
+    # the rows of these methods, sorted by instance, method and seed
+    numbers = np.flatnonzero(np.isin(method_of_row, finished))
+    place_of_row = np.array(table.place, dtype=np.int64)[numbers]
+    seed_of_row = np.array(table.seed, dtype=np.int64)[numbers]
+    place_order = sorted(
+        np.unique(place_of_row).tolist(),
         key=lambda i: (kind.rank(rows.places[i]), json_of(rows.places[i])),
     )
-    instance_of = {i: k for k, i in enumerate(numbers)}
-    seeds = sorted({run.seed for run in runs})
-    seed_of = {seed: k for k, seed in enumerate(seeds)}
-    runs.sort(key=lambda run: (instance_of[run.place], method_of[run.method], run.seed))
-    figures = np.array([run.figures for run in runs]).reshape(-1, len(kind.columns))
+    seeds = list(table.seeds)
+    seed_order = sorted(np.unique(seed_of_row).tolist(), key=seeds.__getitem__)
+    instance = _ranks(place_of_row, place_order)
+    method = _ranks(method_of_row[numbers], finished)
+    seed = _ranks(seed_of_row, seed_order)
+    order = np.lexsort((seed, method, instance))
+    numbers = numbers[order]
+
+    figures = {}
+    for name in kind.columns:
+        # one at a time, because two copies of all take much memory
+        figures[name] = np.array(table.figures.pop(name), dtype=np.float64)[numbers]
     data = {}
-    for name in runs[0].data if runs else ():
-        data[name] = [run.data[name] for run in runs]
+    for name, store in table.data.items():
+        data[name] = Ordered[Any](store, numbers)
+    warnings = {}
+    if table.warnings:
+        for k, number in enumerate(numbers.tolist()):
+            if number in table.warnings:
+                warnings[k] = table.warnings[number]
     failures = []
     for m, cell in rows.quarantined:
         if m in chosen:
             failures.append(_failure(cell, label_of[m]))
-    places = [rows.places[i] for i in numbers]
+    places = [rows.places[i] for i in place_order]
     return Runs(
         kind=kind,
         version=ledger.version,
-        methods=tuple(label_of[m] for m in method_of),
-        variants=tuple(rows.variants[m] for m in method_of),
+        methods=tuple(label_of[m] for m in finished),
+        variants=tuple(rows.variants[m] for m in finished),
         instances=_instance_names(kind, places),
         places=tuple(places),
-        method=np.array([method_of[run.method] for run in runs], dtype=int),
-        instance=np.array([instance_of[run.place] for run in runs], dtype=int),
-        seed=np.array([seed_of[run.seed] for run in runs], dtype=int),
-        seeds=tuple(seeds),
-        keys=tuple(run.key for run in runs),
-        figures=dict(zip(kind.columns, figures.T, strict=True)),
+        method=method[order],
+        instance=instance[order],
+        seed=seed[order],
+        seeds=tuple(seeds[k] for k in seed_order),
+        keys=np.frombuffer(table.keys, f"S{KEY_LENGTH}")[numbers],
+        figures=figures,
         data=data,
-        warnings={k: run.warnings for k, run in enumerate(runs) if run.warnings},
+        warnings=warnings,
         failures=tuple(failures),
     )
+
+
+def _ranks(values: "NDArray[np.int64]", order: Sequence[int]) -> Array:
+    """Return the places of values (n,) in an order of all that occur."""
+    rank = np.zeros(max(order, default=-1) + 1, dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    return np.asarray(rank[values])
 
 
 def _read(ledger: "Ledger") -> _Rows:
@@ -149,10 +207,9 @@ def _read(ledger: "Ledger") -> _Rows:
     """
     variants = _Distinct()
     places = _Distinct()
-    runs = []
-    quarantined = list[tuple[int, Mapping[str, Any]]]()
+    finished: _Finished | None = None
+    quarantined = list[tuple[int, Row]]()
     kinds = set[str]()
-    shared: dict[bytes, Any] = {}  # arrays that many rows have in common
     for row in ledger.all_rows():
         spec = row["spec"]
         kinds.add(spec["kind"])
@@ -161,31 +218,24 @@ def _read(ledger: "Ledger") -> _Rows:
                 f"{ledger.path}: expected a ledger of either tracks or single "
                 "searches, got both"
             )
+        kind = KINDS[spec["kind"]]
+        if finished is None:
+            finished = _Finished(kind)
         try:
             method = variants.number(_variant(spec))
             if row["status"] != "done":
                 quarantined.append((method, row))
                 continue
-            figures, data = KINDS[spec["kind"]].read(row, shared)
-            run = _Run(
-                place=places.number(_place(spec)),
-                method=method,
-                seed=int(spec["seed"]),
-                key=row["key"],
-                warnings=tuple(map(printable, row["warnings"])),
-                figures=figures,
-                data=data,
-            )
+            figures, data = kind.read(row)
+            finished.add(row, places.number(_place(spec)), method, figures, data)
         # raised if a value is missing or has another type
         except (ValueError, TypeError, LookupError, AttributeError) as error:
             raise ledger.damaged_row(row["key"], error) from None
-        runs.append(run)
-    if not kinds:
+    if finished is None:
         raise InputError(
             f"{ledger.path}: expected a ledger with finished rows, got none"
         )
-    kind = KINDS[kinds.pop()]
-    return _Rows(kind, variants.values, places.values, runs, quarantined)
+    return _Rows(kind, variants.values, places.values, finished, quarantined)
 
 
 def _labels(rows: _Rows, latest: bool) -> dict[int, str]:
@@ -194,18 +244,16 @@ def _labels(rows: _Rows, latest: bool) -> dict[int, str]:
     Methods that only failed are last.
     """
     variants = rows.variants
-    score = list(rows.kind.columns).index(rows.kind.score.name)
-    sign = -1.0 if rows.kind.score.down else 1.0
-    badness: list[list[float]] = [[] for _ in variants]
-    for run in rows.runs:
-        badness[run.method].append(sign * float(run.figures[score]))
+    score = rows.kind.score
+    scores = np.array(rows.finished.figures[score.name], dtype=np.float64)
+    badness = np.nan_to_num(-scores if score.down else scores, nan=np.inf)
+    method = np.array(rows.finished.method, dtype=np.int64)
 
     def order(m: int) -> tuple[bool, float, str]:
         """Return a key that is lower for better methods."""
-        mean = (
-            float(np.nan_to_num(badness[m], nan=np.inf).mean()) if badness[m] else 0.0
-        )
-        return not badness[m], mean, json_of(variants[m])
+        own = badness[method == m]
+        mean = float(own.mean()) if len(own) else 0.0
+        return not len(own), mean, json_of(variants[m])
 
     best_first = sorted(
         _latest(variants) if latest else range(len(variants)), key=order

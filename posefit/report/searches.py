@@ -1,7 +1,8 @@
 """Single searches in a report: their figures, names, intervals, baseline and page."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from posefit.reading import counted
 from posefit.report.charts import Chart, Line
 from posefit.report.columns import Column, Score, listed, median
 from posefit.report.contest import Baseline, Contest, Indices, Place, Row, Runs
+from posefit.report.stored import Store
 from posefit.statistics.means import mean_interval, mean_intervals
 from posefit.statistics.profiles import attained, hits
 from posefit.suites.functions import suite_function
@@ -65,6 +67,10 @@ class Searches:
     title = "Report of single searches"
     columns: Mapping[str, Column] = COLUMNS
     score = SCORE
+    # a `SuiteRun`, and the result of `_hits`
+    data: Mapping[str, Callable[[], Store]] = MappingProxyType(
+        {"runs": list, "hits": list}
+    )
 
     def computed(self, row: Row, /) -> dict[str, float]:
         """Return the share of targets that a row reached, and its cost above."""
@@ -72,7 +78,7 @@ class Searches:
         reached = 100.0 * float(np.isfinite(_hits(run)).mean())
         return {"reached": reached, "above": run.cost - run.truth_cost}
 
-    def read(self, row: Row, _: dict[bytes, Any], /) -> tuple[Array, dict[str, Any]]:
+    def read(self, row: Row, /) -> tuple[Array, dict[str, Any]]:
         """Return the figures of a row, its run, and its evaluations to each target."""
         run = search_run(row)
         figures = np.array(list(self.computed(row).values()))

@@ -4,9 +4,10 @@
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, replace
 from operator import itemgetter
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from posefit.reading import counted
 from posefit.report import charts
 from posefit.report.columns import NAMED, Column, Score, listed
 from posefit.report.contest import Baseline, Contest, Indices, Place, Row, Runs
+from posefit.report.stored import Packed, Store, Traces
 from posefit.sweep.repeat import END, TRACK_BEGIN, plan_lines, track_fields
 from posefit.sweep.table import damage, views
 from posefit.uncertainty.calibration import BINS
@@ -155,24 +157,19 @@ class Tracks:
     title = "Report of a sweep"
     columns: Mapping[str, Column] = COLUMNS
     score = SCORE
+    # errors of joints (27,) in mm; modes (bins, 3), see `_binned`; evaluations and
+    # costs
+    data: Mapping[str, Callable[[], Store]] = MappingProxyType(
+        {"joint_errors": Packed, "modes": list, "traces": Traces}
+    )
 
     def computed(self, row: Row, /) -> dict[str, float]:
         """Return the error with losses of a row."""
         return {LOSS: error_with_losses(row)}
 
-    def read(
-        self, row: Row, shared: dict[bytes, Any], /
-    ) -> tuple[Array, dict[str, Any]]:
-        """Return the figures of a row and its other data.
-
-        They are the errors of joints (27,) in mm, the modes (bins, 3), see `_binned`,
-        and the evaluations and costs of the trace.
-
-        `shared` holds arrays that many rows have in common, to save memory.
-        """
+    def read(self, row: Row, /) -> tuple[Array, dict[str, Any]]:
+        """Return the figures of a row and its other data."""
         used = np.array(row["trace"]["evaluations"], np.float32)
-        # many rows have the same evaluations in their traces
-        used = shared.setdefault(used.tobytes(), used)
         trace = used, np.array(row["trace"]["cost"], np.float32)
         joints = np.array(row["joint_errors_mm"], dtype=np.float32)
         row = {**row, **self.computed(row)}
@@ -302,7 +299,7 @@ class Tracks:
             "instance": runs.instance,
             "seed": runs.seed,
             **{name: runs.figures[name] for name in runs.table_figures},
-            "key": [key[:8] for key in runs.keys],
+            "key": runs.keys.astype(str),
         }
         return {
             **part,

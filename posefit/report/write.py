@@ -1,6 +1,6 @@
 """The command `posefit report`: a page, and on request figures, a CSV and a table."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -107,7 +107,7 @@ def write_report(
         if coco is not None:
             write_coco(runs, coco)
         if latex is not None and standings is not None:
-            _write(latex, LATEX_MARK, latex_table(standings))
+            _write(latex, LATEX_MARK, [latex_table(standings)])
     lines = []
     if standings is not None:
         lines += data["answer"]
@@ -121,10 +121,13 @@ def write_report(
     return Report(lines, {"out": out, "kind": runs.kind.name, **dict(printed)})
 
 
-def _write(path: str, mark: str, text: str) -> None:
-    """Write a text as a new file, or in place of an earlier one with this mark."""
-    with replaced_file(path, mark.encode()) as building:
-        building.write_text(text, encoding="utf-8", newline="\n")
+def _write(path: str, mark: str, parts: Iterable[str]) -> None:
+    """Write texts as a new file, or in place of an earlier one with this mark."""
+    with (
+        replaced_file(path, mark.encode()) as building,
+        building.open("w", encoding="utf-8", newline="\n") as file,
+    ):
+        file.writelines(parts)
 
 
 def _csv_rows(ledger: Ledger, kind: Kind) -> Iterator[dict[str, Any]]:

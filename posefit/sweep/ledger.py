@@ -22,7 +22,9 @@ import json
 import os
 import shlex
 import sqlite3
-from collections.abc import Iterator
+from array import array
+from bisect import bisect_left
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -40,7 +42,7 @@ if TYPE_CHECKING:
 
 OPEN_SECONDS = 5.0  # the longest wait for a program that locks a file
 MAX_VALUE_BYTES = 200_000_000  # of one value that is read
-SELECT = "SELECT key, spec, faults, row FROM cells"
+OF = "FROM cells WHERE status = ? ORDER BY rowid"  # the end of most queries
 
 
 class Ledger:
@@ -75,26 +77,32 @@ class Ledger:
             files.update(dict.fromkeys(_files(Path(path))))
         self.files = list(files)
         self._open: list[tuple[Path, sqlite3.Connection]] = []
-        # by status: the file of each cell, by its key
-        self._files_of: dict[str, dict[str, int]] = {"done": {}, "quarantined": {}}
+        # The cells that are done or quarantined now, by file and status: their rowids,
+        # rising. Keys of a million cells would take much memory.
+        self._counted: dict[tuple[int, str], array[int]] = {}
         with ExitStack() as opened:
             opened.callback(self.close)
             for file in self.files:
                 self._open.append((file, _reader(file)))
-            for status in self._files_of:
-                for k in range(len(self._open)):
-                    self._place(status, k)
+            self._count()
             opened.pop_all()
 
-    def _place(self, status: str, k: int) -> None:
-        """Note the cells of file `k` with a status, unless another file has them.
+    def _count(self) -> None:
+        """Note the cells that count.
 
-        A cell that is done in any file is not noted as quarantined.
+        If several files have a cell, the first finished one counts, else the first.
         """
-        query = "SELECT key FROM cells WHERE status = ?"
-        for (key,) in self._query(k, query, status):
-            if key not in self._files_of["done"]:
-                self._files_of[status].setdefault(key, k)
+        several = len(self._open) > 1
+        seen = set[str]()
+        for status in ("done", "quarantined"):
+            for k in range(len(self._open)):
+                counted = self._counted[k, status] = array("q")
+                for rowid, key in self._query(k, f"SELECT rowid, key {OF}", status):
+                    if several and key in seen:
+                        continue
+                    if several:
+                        seen.add(key)
+                    counted.append(rowid)
 
     def __enter__(self) -> Self:
         return self
@@ -103,11 +111,15 @@ class Ledger:
         self.close()
 
     def __len__(self) -> int:
-        return len(self._files_of["done"])
+        return sum(len(self._counted[k, "done"]) for k in range(len(self._open)))
 
     def done(self) -> set[str]:
         """Return the keys of the finished cells."""
-        return set(self._files_of["done"])
+        done = set[str]()
+        for k in range(len(self._open)):
+            for _, key in self._chosen(k, "key", "done"):
+                done.add(key)
+        return done
 
     @property
     def changed(self) -> float:
@@ -165,8 +177,12 @@ class Ledger:
         Its message has a command that plans the cell again.
         """
         name = quoted(key[:8])[1:-1]
-        files = self._files_of["quarantined"] | self._files_of["done"]
-        file = self._open[files[key]][0]
+        file = self.files[0]
+        query = "SELECT rowid, status FROM cells WHERE key = ?"
+        for k, (path, _) in enumerate(self._open):
+            for rowid, status in self._query(k, query, key):
+                if _is_in(rowid, self._counted.get((k, status), [])):
+                    file = path
         statement = f"UPDATE cells SET status = 'planned' WHERE key LIKE '{name}%'"
         return InputError(
             f"{file}: the row of cell {name} must be written by posefit: "
@@ -175,15 +191,21 @@ class Ledger:
         )
 
     def _rows(self, status: str) -> Iterator[dict[str, Any]]:
-        query = f"{SELECT} WHERE status = ? ORDER BY rowid"
         for k in range(len(self._open)):
-            for key, *texts in self._query(k, query, status):
-                if self._files_of[status].get(key) != k:
-                    continue
+            columns = "key, spec, faults, row"
+            for _, key, *texts in self._chosen(k, columns, status):
                 try:
                     yield _parsed_row(key, status, *texts)
                 except (ValueError, TypeError, KeyError, RecursionError) as error:
                     raise self.damaged_row(str(key), error) from None
+
+    def _chosen(self, k: int, columns: str, status: str) -> Iterator[Any]:
+        """Yield the rowid and columns of the cells of a file that count."""
+        counted = self._counted[k, status]
+        for row in self._query(k, f"SELECT rowid, {columns} {OF}", status):
+            # a driver may have finished others since the ledger was opened
+            if _is_in(row[0], counted):
+                yield row
 
     def _query(self, k: int, query: str, *values: Any) -> Iterator[Any]:
         file, database = self._open[k]
@@ -191,6 +213,12 @@ class Ledger:
             yield from database.execute(query, values)
         except (sqlite3.Error, UnicodeDecodeError) as error:
             raise unusable(file, error) from None
+
+
+def _is_in(rowid: int, rising: Sequence[int]) -> bool:
+    """Return whether a rowid is among others, which rise."""
+    place = bisect_left(rising, rowid)
+    return place < len(rising) and rising[place] == rowid
 
 
 def _parsed_row(

@@ -22,7 +22,7 @@ from posefit.footage.kinds import resolve
 from posefit.footage.numbering import Images
 from posefit.footage.options import SourceOptions, text_person
 from posefit.footage.source import body_of, scene_of
-from posefit.footage.views import View
+from posefit.footage.views import View, empty_planes, release
 from tests.cases import each
 from tests.commands import error_of, run
 from tests.footage.conftest import ALL, NOBODY, SIZE, camera, read_masks, stack
@@ -730,3 +730,24 @@ def test_masks_of_a_long_film_are_the_same_in_a_file(
     np.testing.assert_array_equal(long.usable, short.usable)
     again = pickle.loads(pickle.dumps(long))
     np.testing.assert_array_equal(again.bits, short.bits)
+
+
+def test_released_frames_of_a_file_keep_what_was_written(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("posefit.footage.views.PLANES_BYTES", 0)
+    size = (200, 120)  # not of whole pages
+    planes = empty_planes(100, size)
+    rows = np.random.default_rng(0).integers(0, 256, planes.shape, dtype=np.uint8)
+    for k in range(100):
+        planes[k] = rows[k]
+        release(planes, k)
+    np.testing.assert_array_equal(planes, rows)
+    # the end of a file, a piece beyond it, and a slice
+    release(planes, 99)
+    release(planes, 90, 500)
+    release(planes[60:], 10, 20)
+    np.testing.assert_array_equal(planes, rows)
+    in_memory = rows.copy()
+    release(in_memory, 5)
+    np.testing.assert_array_equal(in_memory, rows)

@@ -22,7 +22,7 @@ def row():
 
 def test_every_figure_has_its_place_in_a_row(row):
     computed = TRACKS.computed(row)
-    figures, _ = TRACKS.read(row, {})
+    figures, _ = TRACKS.read(row)
     assert np.isfinite(figures).all()
     columns = flat(row) | computed
     assert dict(zip(COLUMNS, figures, strict=True)) == {

@@ -394,6 +394,13 @@ def test_embedded_data_cannot_leave_its_element_and_numbers_are_plain() -> None:
     }  # fmt: skip
 
 
+def test_long_arrays_are_embedded_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("posefit.page.document.PIECE", 3)
+    for count in range(8):
+        whole = {"a": np.arange(count), "b": {"c": np.arange(count) / 2.0}, "d": {}}
+        assert json.loads(embedded(whole)) == plain(whole)
+
+
 def test_csv_without_rows_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="rows must be at least one, got none"):
         write_csv([], tmp_path / "rows.csv")

@@ -62,10 +62,11 @@ _MARK = "<!doctype html>\n<!-- a track of posefit -->\n"
 def track_document(data: dict[str, Any]) -> str:
     """Return the page that shows the data of a track."""
     style = colour_style(LIGHT, DARK) + part(__package__, "track.css")
-    return assembled(
+    parts = assembled(
         _MARK,
         part(__package__, "track.html"),
         style,
         data,
         one_script(__package__, SCRIPTS),
     )
+    return "".join(parts)

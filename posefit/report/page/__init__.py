@@ -16,6 +16,7 @@ All colours are darker on white and lighter on black, so that each has a contras
 least 4.5 to 1 with its background. Marks distinguish methods too.
 """
 
+from collections.abc import Iterator
 from typing import Any
 
 from posefit.page.document import assembled, colour_style, one_script, part
@@ -31,8 +32,8 @@ LIGHT = {f"c{k}": colour for k, colour in enumerate(_LIGHT)}
 DARK = {f"c{k}": colour for k, colour in enumerate(_DARK)}
 
 
-def document(data: dict[str, Any]) -> str:
-    """Return the page that shows the data of a report."""
+def document(data: dict[str, Any]) -> Iterator[str]:
+    """Yield the parts of the page that shows the data of a report."""
     style = colour_style(LIGHT, DARK) + part(__package__, "report.css")
     return assembled(
         MARK,
