@@ -65,8 +65,8 @@ class Stored:
         if self.fortran:
             if self.nbytes > TURNED:
                 raise InputError(
-                    f"{self._path}: expected {self.name} row by row, "
-                    "got it column by column"
+                    f"{self._path}: expected {self.name} row by row, got column by "
+                    f"column: save numpy.ascontiguousarray({self.name})"
                 )
             yield from np.asarray(self)
             return

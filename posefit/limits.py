@@ -159,9 +159,9 @@ def check_decoded(name: str, size: int) -> None:
     except ValueError:
         raise InputError(f"{DECODED} must be a number, got {quoted(text)}") from None
     if not size <= most * 1e9:
-        came = f"{size / 1e9:.3g} GB; {DECODED} raises the limit"
         raise InputError(
-            f"{name}: expected masks that unpack to at most {most:g} GB, got {came}"
+            f"{name}: expected masks that unpack to at most {most:g} GB, "
+            f"got {size / 1e9:.3g} GB: set {DECODED} to allow more"
         )
 
 

@@ -185,7 +185,8 @@ FRAMES = under("Source and camera")(
     default=":",
     callback=parsed_by(text_range),
     metavar="A:B",
-    help="Use only these frames: of footage as filmed, of a motion after resampling.",
+    help="Use only frames A to B - 1, numbered as filmed; of a motion, after "
+    "resampling.",
 )
 JSON = _result(
     "--json",

@@ -190,8 +190,8 @@ def draw_population(space: Space, rng: np.random.Generator, count: int) -> Array
         drawn = _drawn(space, None, rng, count)
     if drawn is None:
         raise InputError(
-            "some of the prior's range must be feasible,"
-            f" got none in {REDRAWS} x {count} draws"
+            "the prior must have feasible latents in its range, "
+            f"got none in {REDRAWS} x {count} samples"
         )
     return drawn
 

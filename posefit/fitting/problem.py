@@ -99,7 +99,9 @@ def minimise(
             f"got {problem.remaining_evaluations:.0f}"
         )
     if not np.isfinite(problem.best_cost):
-        raise InputError(f"costs must be numbers, got none in {used} evaluations")
+        raise InputError(
+            f"costs must be finite, got only nan or infinity in {used} evaluations"
+        )
     if not budget_known and 2 * problem.evaluations < problem.budget:
         warnings.warn(
             f"the optimiser ended its search after {used} of {problem.budget} "

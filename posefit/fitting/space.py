@@ -84,8 +84,8 @@ class SearchSpace:
         one_of("translation", self.translation, TRANSLATIONS)
         if self.root_order == "xyz" and self.tilt is not None:
             raise InputError(
-                'tilt must be "box" where the root is in the order xyz,'
-                " got a learned one"
+                'tilt must be "box" with the root order "xyz", that of the variant '
+                '"paper", got a learned one'
             )
         for name in ("root_range", "translation_range"):
             reach = np.asarray(getattr(self, name))

@@ -68,8 +68,8 @@ def read_annotations(
     check_size(existing(path), LARGEST)
     if isinstance(category, int):
         raise InputError(
-            "label must be given for masks whose values are labels, "
-            f"got {category} for {path}; --category chooses among annotations"
+            f"label must be left out for annotations, got {category} for {path}: "
+            "--category chooses among them"
         )
     content = _Content(path, category)
     images = content.images
@@ -210,7 +210,7 @@ class _Content:
         if wanted not in named:
             there = cut(", ".join(map(quoted, named))) or "none"
             raise InputError(
-                f"{self._path}: category must be one of those that are there, {there}, "
+                f"{self._path}: category must be one of the file's, {there}, "
                 f"got {quoted(wanted)}"
             )
         return named[wanted]

@@ -294,9 +294,10 @@ def _rate(views: Sequence[View], fps: float | None) -> tuple[float, bool]:
     stated = [(view.fps, view.name) for view in views if view.fps is not None]
     for rate, name in stated[1:]:
         if views[0].filmed is None and rate != stated[0][0]:
-            came = f"{stated[0][0]:g} of {stated[0][1]} and {rate:g} of {name}"
+            came = f"{stated[0][0]:g} Hz of {stated[0][1]} and {rate:g} Hz of {name}"
             raise InputError(
-                f"views must have one frame rate, frames a second, got {came}"
+                f"views must have the same frame rate, got {came}: "
+                "convert one of them, or give the rate of all as fps"
             )
     return (stated[0][0], True) if stated else (FPS, False)
 

@@ -89,8 +89,8 @@ class Extraction:
                 takers.append(offer.name)
         if self.name not in takers:
             raise InputError(
-                f"background must be given for the method {' or '.join(takers)} only, "
-                f"got {quoted(self.background)} with {self.name}"
+                f"background applies only to the method {' or '.join(takers)}, "
+                f"got {quoted(self.background)} with {self.name}: leave it out"
             )
 
     @property

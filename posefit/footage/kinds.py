@@ -255,8 +255,8 @@ def _place(source: Footage) -> Place:
         return path
     if path.is_file():
         raise InputError(
-            f"{path}: expected a name that ends in what the file is, such as .mp4, "
-            ".npz or .bvh, got no suffix"
+            f"{path}: expected a file name with a suffix such as .mp4, .npz or .bvh, "
+            "got none: rename it"
         )
     return existing(path) if os.sep in str(source) else source
 
@@ -273,8 +273,8 @@ def _images_of_folder(folder: Path) -> Images:
     """Return the images in a folder. Raises InputError if it contains none."""
     if (folder / "poses.npz").is_file() and (folder / "summary.json").is_file():
         raise InputError(
-            f"{folder}: expected a source, got a track's folder: give the source that "
-            "it was made from"
+            f"{folder}: expected a source, got the folder of a track: give the video, "
+            "masks or motion that it was made from"
         )
     images = images_in(folder)
     if not images:

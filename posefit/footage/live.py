@@ -105,7 +105,7 @@ class Stream:
                 yield image
             elif not came:
                 raise InputError(
-                    f"{self.name}: expected a frame, got none for {STALL_SECONDS:g} s"
+                    f"{self.name}: no frame arrived for {STALL_SECONDS:g} s"
                 )
             elif self._error is not None:
                 raise self._error
@@ -151,7 +151,7 @@ def netpbm_images(stream: BinaryIO) -> Iterator[Image]:
         shape = (height, width) if is_grey else (height, width, 3)
         values = stream.read(int(np.prod(shape)))
         if len(values) < np.prod(shape):
-            raise InputError("expected a whole image, got one that breaks off")
+            raise InputError("the last image is incomplete")
         image = np.frombuffer(values, dtype=np.uint8).reshape(shape)
         # PPM stores red first, OpenCV blue
         yield image if is_grey else np.ascontiguousarray(image[..., ::-1])

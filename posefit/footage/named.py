@@ -46,7 +46,7 @@ def sources_of(source: Any) -> list[Footage]:
             f"got {quoted(source)}"
         )
     if not source:
-        raise InputError("source must name something, got an empty list")
+        raise InputError("source must not be an empty list")
     frames = _frames(source)
     return [_view(each) for each in source] if frames is None else [frames]
 
@@ -96,8 +96,8 @@ def _are_films(files: Sequence[Path]) -> bool:
         return False
     if min(pages) == 1:
         raise InputError(
-            "source must be images of one page each, or a file of several pages for "
-            f"each camera, got {files[pages.index(1)]} with only one page"
+            "source must be images with one page each, or one file with several pages "
+            f"for each camera, got {files[pages.index(1)]} with one page"
         )
     return True
 

@@ -272,8 +272,8 @@ def _paired(
             for numbers, name in zip(known, names, strict=True)
         )
         raise InputError(
-            "images of one moment must have one number in the names of all cameras, "
-            f"got {came}"
+            "images of the same moment must have the same number in the names of all "
+            f"cameras, got {came}"
         )
     lowest = min(numbers[0] for numbers in known)
     highest = max(numbers[-1] for numbers in known)

@@ -82,8 +82,8 @@ class Observations(Sequence[Observation]):
                 return int(enough.argmax())
         view = self.views[0]
         raise InputError(
-            f"{view.name}, frame {view.numbers[0]}: expected a frame that is usable, "
-            "got none from there on"
+            f"{view.name}: no frame from {view.numbers[0]} on shows enough of the "
+            "person"
         )
 
     def silhouettes(self, k: int) -> list[Silhouette]:

@@ -187,14 +187,14 @@ class SourceOptions(Options):
     up: "Up | None" = option(
         None,
         "Axis that points up in the world of a calibration, or of a .bvh or .amc "
-        "file. Default: recognised.",
+        "file. Default: guessed.",
         choice("x", "y", "z"),
         "x|y|z",
     )
     unit: "Unit | None" = option(
         None,
         "Unit of lengths in a calibration, or in a .bvh or .asf file. "
-        "Default: recognised.",
+        "Default: guessed.",
         choice(*UNITS),
         "|".join(UNITS),
     )

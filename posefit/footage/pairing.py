@@ -88,8 +88,8 @@ def calibrated(
         isinstance(camera, Calibration) and camera.rotation is None for camera in known
     ):
         raise InputError(
-            "camera must say where each of several cameras stands, got a file without "
-            "rotation"
+            "with several cameras, each calibration must have a rotation and a "
+            "translation, got a file without rotation"
         )
     if views > 1:
         _check_places(known)
@@ -155,9 +155,10 @@ def order_by_name(
             orders.add(order)
     if len(orders) > 1:
         raise InputError(
-            "cameras must have names that only fit one order of the sources, got "
-            f"{cut(', '.join(names))} for {cut(', '.join(sources))}; "
-            "give one file a camera, of other names"
+            "cannot tell which camera took which source, got "
+            f"{cut(', '.join(names))} for {cut(', '.join(sources))}: "
+            "give one calibration file for each camera, in the order of the sources "
+            "and with names that do not occur in theirs"
         )
     return list(*orders) if orders else in_order
 

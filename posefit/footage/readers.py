@@ -235,9 +235,7 @@ def _stated_usable(
         return np.ones(stop - start, dtype=bool)
     usable = np.asarray(arrays["usable"])[start:stop].copy()
     if not usable.any():
-        raise InputError(
-            f"{name}: expected a frame that is usable, got none from {start} to {stop}"
-        )
+        raise InputError(f"{name}: no frame from {start} to {stop} is marked as usable")
     return usable
 
 
@@ -249,7 +247,7 @@ def _stated_landmarks(name: str, arrays: Arrays, start: int, stop: int) -> Array
     if not np.isfinite(landmarks).all() or landmarks[..., 2].min() < 0.0:
         raise InputError(
             f"{name}: landmarks must be finite numbers with confidences of 0 or "
-            "more, got others"
+            "more, got nan, infinity or a negative confidence"
         )
     return landmarks
 
@@ -262,7 +260,9 @@ NARROW = 4
 def _checked_stack(name: str, arrays: Arrays) -> Stored | NDArray[Any]:
     """Return the masks. Raises InputError if any array has a wrong shape or type."""
     if "masks" not in arrays:
-        raise InputError(f"{name}: expected an .npz file with the key masks, got none")
+        raise InputError(
+            f"{name}: expected an .npz file with the key masks, got one without it"
+        )
     stack = arrays["masks"]
     shape = tuple(stack.shape)
     if len(shape) != 3 or 0 in shape or stack.dtype.kind not in "buif":

@@ -182,8 +182,8 @@ def views_of_masks(
     for kind, place in zip(source.kinds, source.places, strict=True):
         if isinstance(label, str) and not kind.has_categories:
             raise InputError(
-                f"category must be given for annotations ({ANNOTATIONS}) only, "
-                f"got {quoted(label)}"
+                f"category applies only to annotations ({ANNOTATIONS}), "
+                f"got {quoted(label)}: leave it out"
             )
         if kind.view is not None:
             views.append(kind.view(place, frames, label, fps))

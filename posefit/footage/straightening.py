@@ -159,11 +159,13 @@ def fitting(
     if calibration.size is None:
         middle = "x".join(f"{value:g}" for value in calibration.matrix[:2, 2])
         raise InputError(
-            f"camera{name} must be of {size[0]}x{size[1]}, got a centre of {middle}"
+            f"camera{name} must be calibrated for {size[0]}x{size[1]}, the size of the "
+            f"pictures, got a centre of {middle}: calibrate again at this size"
         )
     width, height = calibration.size
     if scaled and abs(size[0] * height / (size[1] * width) - 1.0) <= SAME_SHAPE:
         return calibration
     raise InputError(
-        f"camera{name} must be calibrated for {size[0]}x{size[1]}, got {width}x{height}"
+        f"camera{name} must be calibrated for {size[0]}x{size[1]}, the size of the "
+        f"pictures, got {width}x{height}: calibrate again at this size"
     )

@@ -65,6 +65,6 @@ def useless_for(medium: Medium, name: str, value: object, where: str) -> InputEr
     `where` says which sources the option is for.
     """
     return InputError(
-        f"{name} must be given for {where} only, got {quoted(value)} "
-        f"for {_MEDIA[medium]}"
+        f"{name} applies only to {where}, got {quoted(value)} "
+        f"for {_MEDIA[medium]}: leave it out"
     )

@@ -137,14 +137,13 @@ class ValueCounts:
     def _labelled(self, label: int, name: object) -> Classifier:
         """Return the classifier of a label that the user gave."""
         if self.soft:
-            kinds = "masks whose values are labels, PNG or whole numbers"
-            raise InputError(f"{name}: label must be given for {kinds}, got soft ones")
+            raise InputError(
+                f"{name}: label must be left out for soft masks, got {label}: "
+                "only PNG files and whole numbers have labels"
+            )
         if label not in self.pixels:
             there = self._listed([value for value, _ in self.pixels.most_common()])
-            raise InputError(
-                f"{name}: label must be one of those that are there, {there}, "
-                f"got {label}"
-            )
+            raise InputError(f"{name}: label must be one of {there}, got {label}")
         return lambda values: np.asarray(values == label)
 
     def _several(self, name: object, labels: Sequence[float]) -> InputError:
@@ -214,8 +213,8 @@ def _between(threshold: float, most: float) -> Classifier:
 def many_colours(name: object) -> InputError:
     """Return the error for pictures in many colours, which are no masks."""
     return InputError(
-        f"{name}: expected masks, got pictures in many colours; "
-        "a person cut out needs an alpha channel"
+        f"{name}: expected masks, got pictures in many colours: "
+        "make masks of the person, or cut them out with an alpha channel"
     )
 
 

@@ -303,8 +303,8 @@ def _read_head(path: Path) -> _Head:
         read, image = capture.read()
         if not read:
             raise InputError(
-                f"{path}: expected a video that OpenCV can read, got none or one "
-                "without frames"
+                f"{path}: expected a video that OpenCV can read, got another or a "
+                "damaged file: convert it with ffmpeg -i FILE -c:v libx264 NEW.mp4"
             )
         fps = float(capture.get(cv2.CAP_PROP_FPS))
         claimed = float(capture.get(cv2.CAP_PROP_FRAME_COUNT))
@@ -347,9 +347,8 @@ def _check_written(path: Path, first: Any, capture: Any) -> None:
             return
         more, image = capture.read()
     raise InputError(
-        f"{path}: expected a film, got the same picture in all frames; if it is "
-        "interlaced, which this OpenCV cannot read: "
-        "ffmpeg -i FILE -vf yadif NEW.mp4"
+        f"{path}: all frames show the same picture; if the video is interlaced, "
+        "convert it with ffmpeg -i FILE -vf yadif NEW.mp4"
     )
 
 

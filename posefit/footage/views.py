@@ -164,7 +164,9 @@ def together(views: Sequence[View]) -> list[View]:
         if len(set(starts)) > 1:
             each = zip(starts, names, strict=True)
             came = " and ".join(f"{first} of {name}" for first, name in each)
-            raise InputError(f"cameras must begin with one frame, got frame {came}")
+            raise InputError(
+                f"all cameras must begin with the same frame, got frame {came}"
+            )
         return list(views)
     start = max(starts)
     stop = min(stops)
@@ -219,8 +221,8 @@ def empty_planes(count: int, size: tuple[int, int]) -> Planes:
     most = allowed_bytes()
     if count * octets > most:
         raise InputError(
-            f"frames must be so few that their masks fit in {most / 1e9:.1f} GB of "
-            f"memory, got {count} of {size[0]}x{size[1]} pixels"
+            f"the masks must fit in {most / 1e9:.1f} GB of memory, got {count} frames "
+            f"of {size[0]}x{size[1]} pixels: choose fewer with --frames"
         )
     if count * octets <= PLANES_BYTES:
         return np.empty((count, octets), dtype=np.uint8)
@@ -266,7 +268,7 @@ def check_some(name: str, there: NDArray[np.bool_], start: int) -> None:
     """Raise InputError if none of the chosen images (T,) is there."""
     if not there.any():
         raise InputError(
-            f"{name}: frames must choose some of the images that are there, "
+            f"{name}: frames must contain an image, "
             f"got none from {start} to {start + len(there)}"
         )
 
@@ -306,6 +308,6 @@ def span(frames: Range, count: int, first: int = 0) -> tuple[int, int]:
         low, high = ("" if value is None else value for value in frames)
         numbers = f" {first}:{first + count}" if first else ""
         raise InputError(
-            f"frames must choose some of the {count} frames{numbers}, got {low}:{high}"
+            f"frames must contain one of the {count} frames{numbers}, got {low}:{high}"
         )
     return start, stop

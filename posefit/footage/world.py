@@ -52,8 +52,8 @@ def world_of(
         if calibration.scale == "metres":
             if unit not in (None, "m"):
                 raise InputError(
-                    f"unit must be left out for {quoted(calibration.name)}, whose unit "
-                    f"is known, got {quoted(unit)}"
+                    f"unit must be left out for {quoted(calibration.name)}, which is "
+                    f"in metres, got {quoted(unit)}"
                 )
         elif calibration.translation is not None:
             distances.append(float(np.linalg.norm(calibration.translation)))

@@ -43,8 +43,8 @@ class VideoWriter:
         )
         if not self._writer.isOpened():
             raise InputError(
-                f"expected OpenCV to write {CODE} video, got a build or a disk that "
-                "cannot"
+                f"OpenCV cannot write {CODE} video here: check the disk, or install "
+                "opencv-python-headless, which has FFmpeg"
             )
 
     def write(self, image: Image) -> None:

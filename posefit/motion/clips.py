@@ -155,8 +155,8 @@ def load_motion(
     for name, value in (("unit", stated.unit), ("up", stated.up)):
         if value is not None and suffix not in MOTIONS:
             raise InputError(
-                f"{name} must be given for {' and '.join(MOTIONS)} files only, "
-                f"got {quoted(value)}"
+                f"{name} applies only to {' and '.join(MOTIONS)} files, "
+                f"got {quoted(value)}: leave it out"
             )
     return clip_of(source, stated).motion(fps)
 

@@ -103,7 +103,7 @@ class OutputFolder(Recorder):
             frames, state, damage = read_frames(self.building / RECORD)
         except OSError as error:
             raise InputError(
-                f"{self.path}: expected a place to write to, got {error.strerror}"
+                f"{self.path}: cannot write there: {error.strerror}"
             ) from None
         if damage:
             self._log(f"{WARNING}{damage}; tracked again from there")
@@ -128,9 +128,9 @@ class OutputFolder(Recorder):
                 self._unfinished.finish(_WRITTEN, self._force)
             except OSError as failure:
                 self._unfinished.close()
-                where = f"{failure.strerror}; the results are in {self.building}"
                 raise InputError(
-                    f"{self.path}: expected its name to be free, got {where}"
+                    f"{self.path}: cannot put the results there: {failure.strerror}; "
+                    f"they are in {self.building}"
                 ) from None
             for name in (RECORD, *CARRIED_FILES):
                 (self.path / name).unlink(missing_ok=True)
@@ -146,24 +146,21 @@ class OutputFolder(Recorder):
             self._unfinished.close()
         else:
             self._unfinished.remove(_WRITTEN)
-        if isinstance(error, OSError) and (expected := self._expected(error)):
+        if isinstance(error, OSError) and self._is_about_folder(error):
             cause = f"{error.strerror or error}{notice}"
-            raise InputError(
-                f"{self.path}: expected {expected}, got {cause}"
-            ) from error
+            raise InputError(f"{self.path}: cannot write there: {cause}") from error
         if notice and isinstance(error, InputError):
             raise InputError(f"{error}{notice}") from error
         if notice:
             self._log(notice[2:])
 
-    def _expected(self, error: OSError) -> str:
-        """Return what was missing if an error is about this folder, or else ""."""
-        if error.errno in NO_ROOM:
-            return "room on the disk"
-        # an error of another file, such as the footage, speaks for itself
-        if str(error.filename).startswith(str(self.building)):
-            return "a place to write to"
-        return ""
+    def _is_about_folder(self, error: OSError) -> bool:
+        """Return whether an error is about this folder or the room on its disk.
+
+        An error of another file, such as the footage, speaks for itself.
+        """
+        is_inside = str(error.filename).startswith(str(self.building))
+        return error.errno in NO_ROOM or is_inside
 
     def earlier(self) -> tuple[list[Frame], dict[str, Any] | None]:
         """Return the frames recorded before, and the random state after the last."""
@@ -223,7 +220,7 @@ def _interrupted(path: Path, spec: Mapping[str, Digest]) -> Unfinished:
     except (AttributeError, TypeError):
         raise InputError(
             f"{interrupted[0].path / MARK}: expected the arguments of a track, "
-            "got something else"
+            "got something else: track without --resume"
         ) from None
     resumed = interrupted[others.index(None)] if None in others else None
     for folder in interrupted:

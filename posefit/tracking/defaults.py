@@ -70,7 +70,6 @@ def completed(options: TrackOptions, motion: Source | None) -> TrackOptions:
     )
     if options.smooth and options.translation == "known":
         raise InputError(
-            "smooth must be given with a translation that is searched or aligned, "
-            "got known"
+            "smooth needs a translation that is searched or aligned, got known"
         )
     return options

@@ -96,7 +96,10 @@ def track(
         if getattr(chosen, each.name) != each.default:
             changed.append(each.name)
     if scene is not None and changed:
-        raise InputError(f"a scene must be tracked as it is, got {', '.join(changed)}")
+        raise InputError(
+            "options of the source must be left out for a scene, "
+            f"got {', '.join(changed)}"
+        )
     check_used(resolved.medium, chosen)
     known = resolved.medium == "motion"
     _check_for_kind(chosen, known, [*resolved.named, *chosen.train])
@@ -108,9 +111,7 @@ def track(
     kinds = chosen_kinds(write)
     for name, value in (("resume", resume), ("force", force), ("write", len(write))):
         if value and out is None:
-            raise InputError(
-                f"{name} must be given with out, the folder of the track, got none"
-            )
+            raise InputError(f"{name} needs out, the folder of the track, got none")
     progress = progress or interactive()
     recorder = Recorder()
     if out is not None:
@@ -207,23 +208,20 @@ def _check_for_kind(
     folders = any(Path(motion).is_dir() for motion in named)
     if options.rate is not None and not (captured or folders):
         raise InputError(
-            f"rate must be given for .amc files only, got {quoted(options.rate)}"
+            f"rate applies only to .amc files, got {quoted(options.rate)}: leave it out"
         )
     if not known:
         if options.translation == "known":
             raise InputError(
-                "translation must be searched or aligned "
-                "where only masks are given, got known"
+                "translation must be searched or aligned for footage, got known"
             )
         if options.first_pose == "given":
-            raise InputError(
-                "first_pose must be searched where only masks are given, got given"
-            )
+            raise InputError("first_pose must be searched for footage, got given")
         return
     if options.asf is not None and not captured:
         raise InputError(
-            "asf must be given for .amc files and footage only, "
-            f"got {quoted(str(options.asf))}"
+            "asf applies only to .amc files and footage, "
+            f"got {quoted(str(options.asf))}: leave it out"
         )
 
 

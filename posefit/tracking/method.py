@@ -319,7 +319,7 @@ def _owner(
         return plugin, setting
     if dot:
         raise InputError(
-            f"a setting must name one of {', '.join(places)}, "
+            f"a setting must belong to one of {', '.join(places)}, "
             f"which are in use here, got {quoted(key)}"
         )
     names = {plugin: settings.names(factory) for plugin, (_, factory) in places.items()}

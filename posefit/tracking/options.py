@@ -101,7 +101,8 @@ class TrackOptions(SourceOptions):
     )
     translation: "Translation | None" = option(
         None,
-        "Position of the root: known (the truth), searched, or aligned.",
+        "Position of the root: known (the truth), searched, or aligned to the mask. "
+        "Default: known for motions, aligned for footage.",
         choice("known", "searched", "aligned"),
         "HOW",
         heading="Tracking",

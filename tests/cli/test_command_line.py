@@ -104,7 +104,7 @@ def test_track_writes_a_folder_that_can_be_opened_again(tmp_path: Path) -> None:
     for words, message in (
         (
             [out],
-            "expected a source, got a track's folder: give the source that it was made from",
+            "expected a source, got the folder of a track: give the video, masks or motion that it was made from",
         ),
         (
             ["walk", "--camera", out / "poses.npz"],
@@ -311,15 +311,15 @@ def test_a_mistake_is_reported_in_one_line_and_status_2(tmp_path: Path) -> None:
         ),
         (
             ["walk", "--roi", "1,2,3,4"],
-            "roi must be given for video only, got (1, 2, 3, 4) for a motion",
+            "roi applies only to video, got (1, 2, 3, 4) for a motion",
         ),
         (
             ["walk", "--extraction", "median"],
-            "extraction must be given for video only, got 'median' for a motion",
+            "extraction applies only to video, got 'median' for a motion",
         ),
         (
             ["lost.avi", "--size", "320x240"],
-            "size must be given for motions only, got (320, 240) for a video",
+            "size applies only to motions, got (320, 240) for a video",
         ),
         (["lost.amc"], "lost.amc: expected a file, got nothing of that name"),
         (["walk.txt"], "walk.txt: expected a file"),
@@ -632,7 +632,7 @@ def test_a_setting_that_makes_no_sense_is_reported_in_one_line() -> None:
         ("sapso=3", "tracker.relocalise_gap, tracker.variant, got 'sapso'"),
         (
             "lens.phi=4.2",
-            "a setting must name one of annealed, pca, tracker, which are in use here, got 'lens.phi'",
+            "a setting must belong to one of annealed, pca, tracker, which are in use here, got 'lens.phi'",
         ),
         ("sapso.cooling=2", "cooling must lie in 0 to 1, got 2"),
         ("tracker.floor=0", "floor must be above 0, got 0"),

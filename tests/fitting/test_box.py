@@ -122,7 +122,7 @@ def test_a_draw_around_a_mean_far_out_of_the_box_is_folded_into_it() -> None:
 
 
 def test_a_draw_where_nothing_is_feasible_is_an_error() -> None:
-    with pytest.raises(ValueError, match="range must be feasible, got none"):
+    with pytest.raises(ValueError, match="feasible latents in its range, got none"):
         draw_population(Toy(2, nowhere), np.random.default_rng(0), 3)
 
 

@@ -367,7 +367,8 @@ def test_nan_is_never_the_best_cost() -> None:
     problem = Problem(lambda x: np.where(x[:, 0] == 1.0, 5.0, np.nan), LINE, 9)
     assert minimise(problem, Walker(3)).best_cost == 5.0
     with pytest.raises(
-        ValueError, match="costs must be numbers, got none in 9 evaluations"
+        ValueError,
+        match="costs must be finite, got only nan or infinity in 9 evaluations",
     ):
         minimise(Problem(lambda x: x[:, 0] * np.nan, LINE, 9), Walker(3))
 

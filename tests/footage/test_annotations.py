@@ -184,15 +184,15 @@ def test_another_category_is_chosen_by_name(walk: list[Any], tmp_path: Path) -> 
     scene = scene_of([path], SourceOptions(category="person"))
     assert len(scene.observations) == len(walk)
     error = error_of("track", path, "--category", "cat", "--out", tmp_path / "out")
-    assert "category must be one of those that are there, 'ball', 'person', " in error
+    assert "category must be one of the file's, 'ball', 'person', " in error
     error = error_of("track", path, "--label", "1", "--out", tmp_path / "out")
-    assert "--category chooses among annotations" in error
+    assert "--category chooses among them" in error
     np.savez(tmp_path / "m.npz", masks=np.array(walk))
     for source in ("walk", tmp_path / "m.npz"):
         error = error_of(
             "track", source, "--category", "person", "--out", tmp_path / "out"
         )
-        assert "category must be given for annotations" in error
+        assert "category applies only to annotations" in error
 
 
 GOOD = {"size": [HEIGHT, WIDTH], "counts": [WIDTH * HEIGHT]}

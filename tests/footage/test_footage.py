@@ -1,5 +1,6 @@
 """Video and masks of real cameras: calibrations, several views, restarts, what is written, and what is resumed."""
 
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -226,7 +227,7 @@ def test_a_track_that_cannot_be_resumed_is_reported(tmp_path: Path) -> None:
         ValueError, match="expected an interrupted track to resume, got none"
     ):
         posefit.track("walk", resume=True, out=tmp_path / "out")
-    with pytest.raises(ValueError, match="resume must be given with out"):
+    with pytest.raises(ValueError, match="resume needs out"):
         posefit.track("walk", resume=True)
 
 
@@ -251,7 +252,7 @@ def test_a_full_disk_is_reported_in_one_line_and_loses_no_frame(tmp_path: Path) 
     lines = [line for line in done.stderr.splitlines() if line.startswith("posefit:")]
     assert done.returncode == 2, done.stderr
     assert len(lines) == 1
-    assert "expected room on the disk, got File too large" in lines[0]
+    assert "cannot write there: File too large" in lines[0]
     assert "finished frames are kept" in lines[0]
     assert not (tmp_path / "out").exists()
     again = run(*words, "--resume")
@@ -330,7 +331,7 @@ def test_a_video_that_changes_its_size_is_named(filmed: Film) -> None:
     ("words", "message"),
     [
         (
-            ["VIDEO", "VIDEO"],
+            ["VIDEO", "COPY"],
             "camera must be given for each of several views, 2, got none",
         ),
         (["VIDEO", "walk"], "sources must be of one kind, got motion and video"),
@@ -340,7 +341,7 @@ def test_a_video_that_changes_its_size_is_named(filmed: Film) -> None:
         ),
         (
             ["VIDEO", "--camera", "LARGE"],
-            "camera 'large' must be calibrated for 160x120, got 320x240",
+            "camera 'large' must be calibrated for 160x120, the size of the pictures, got 320x240",
         ),
         (["VIDEO", "--camera", "TWO"], "camera must be given for each view, 1, got 2"),
         (["VIDEO", "--height", "17"], "height must lie in 0.3 to 2.8 metres, got 17.0"),
@@ -351,11 +352,11 @@ def test_a_video_that_changes_its_size_is_named(filmed: Film) -> None:
         ),
         (
             ["VIDEO", "--translation", "known"],
-            "translation must be searched or aligned where only masks are given",
+            "translation must be searched or aligned for footage",
         ),
         (
             ["VIDEO", "--first-pose", "given"],
-            "first_pose must be searched where only masks are given",
+            "first_pose must be searched for footage",
         ),
         (
             ["VIDEO", "--frames", "0:5"],
@@ -372,7 +373,13 @@ def test_a_mistake_with_footage_leaves_one_line(
         posefit.Camera.around(np.zeros(3), 0.0, 4.0, (320, 240)).to_json()
     )
     two = toml(inputs / "two.toml", camera(0.0), camera(1.0))
-    names = {"VIDEO": filmed[0], "LARGE": inputs / "large.json", "TWO": two}
+    copy = shutil.copy(filmed[0], inputs / "copy.avi")
+    names = {
+        "VIDEO": filmed[0],
+        "COPY": copy,
+        "LARGE": inputs / "large.json",
+        "TWO": two,
+    }
     assert message in error_of(
         "track", *(names.get(word, word) for word in words), "--out", tmp_path / "out"
     )
@@ -387,7 +394,7 @@ def test_a_mistake_with_footage_leaves_one_line(
         ("walk.fbx", "x", "motions of .fbx are not read; .amc and .bvh are"),
         ("rle.json", "{}", "expected COCO's lists images, annotations and categories"),
         ("poses.pkl", "x", "masks and motions of .pkl are not read; masks as images"),
-        ("noext", "x", "a name that ends in what the file is, such as .mp4"),
+        ("noext", "x", "a file name with a suffix such as .mp4"),
         ("missing.trc", None, "expected a file, got nothing of that name"),
     ],
 )

@@ -61,7 +61,7 @@ def test_several_files_of_pages_belong_to_several_cameras(
     assert sources_of(films) == [(films[0],), (films[1],)]
     single = tmp_path / f"c{suffix}"
     first.save(single)
-    with pytest.raises(InputError, match=f"got .*c{suffix} with only one page"):
+    with pytest.raises(InputError, match=f"got .*c{suffix} with one page"):
         sources_of([*films, single])
 
 

@@ -1,5 +1,6 @@
 """Whether masks from a video are a person's: one who is always in the picture is refused; and which way they face."""
 
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
@@ -95,8 +96,10 @@ def test_if_a_network_is_installed_the_segmenter_without_doubts_is_used(
     network: str,
     used: str | None,
     monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
 ) -> None:
     path, true = films[kind]
+    paths = [path, Path(shutil.copy(path, tmp_path / path.name))][:cameras]
 
     class Network:
         def __init__(self, film: object) -> None:
@@ -122,9 +125,9 @@ def test_if_a_network_is_installed_the_segmenter_without_doubts_is_used(
         with pytest.raises(
             InputError, match="the person seems to stand in the background"
         ):
-            scene_of([path] * cameras, SourceOptions(**view))
+            scene_of(paths, SourceOptions(**view))
         return
-    scene = scene_of([path] * cameras, SourceOptions(**view))
+    scene = scene_of(paths, SourceOptions(**view))
     masks = [observation.silhouettes[0].mask for observation in scene.observations]
     assert (overlap(masks, true) > 0.95) == (used == "mediapipe")
     first, second = (

@@ -254,7 +254,7 @@ def test_pictures_of_another_size_are_scaled_or_cropped_with_a_note(
 def test_pictures_of_another_shape_are_refused(tmp_path: Path) -> None:
     made = replace(usual(), width=640, height=360, centre=np.array([320.0, 180.0]))
     path = stack(tmp_path / "a.npz", [np.eye(480, 640, dtype=bool)] * 2)
-    with pytest.raises(InputError, match="'cam0' must be calibrated for 640x480, got 640x360"):  # fmt: skip
+    with pytest.raises(InputError, match="'cam0' must be calibrated for 640x480, the size of the pictures, got 640x360"):  # fmt: skip
         scene_of([path], SourceOptions(camera=[toml(tmp_path / "one.toml", made)]))
 
 

@@ -31,7 +31,7 @@ def test_frames_that_are_all_the_same_are_refused(tmp_path: Path) -> None:
     )
     with pytest.raises(
         ValueError,
-        match="a.mkv: expected a film, got the same picture in all frames; if it is int",
+        match="a.mkv: all frames show the same picture; if the video is int",
     ):
         Video.of(path)
 

@@ -123,7 +123,7 @@ def test_a_track_with_numpys_arguments_is_written(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("source", "message"),
     [
-        ([], "source must name something, got an empty list"),
+        ([], "source must not be an empty list"),
         ([[]], "source must have image files or masks in the list of each camera"),
         ([[1, 2], [3, 4]], "source must have image files or masks"),
         ({"a.png"}, "source must be a motion, masks, a video or a list of these"),

@@ -527,14 +527,14 @@ def test_files_are_chosen_by_their_kinds_or_names(write: Any, kinds: Any) -> Non
         (["tracks.bvh"], "got 'tracks.bvh'; did you mean 'track.bvh'"),
         ([3], "write must be names of files, got"),
         (" , ", "write must name a file such as bvh, got ' , '"),
-        ("bvh", "write must be given with out, the folder of the track, got none"),
+        ("bvh", "write needs out, the folder of the track, got none"),
     ],
 )
 def test_a_file_that_is_not_known_is_named_before_the_work(
     write: Any, message: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr("posefit.tracking.front.scene_of", None)
-    out = {} if "given with" in message else {"out": tmp_path / "out"}
+    out = {} if "needs out" in message else {"out": tmp_path / "out"}
     with pytest.raises(InputError, match=message):
         posefit.track("walk", write=write, progress=QUIET, **out)
     assert not (tmp_path / "out").exists()
@@ -605,7 +605,7 @@ def test_a_disk_without_room_for_the_poses_keeps_the_frames_and_resuming_writes_
 @each(
     ("error", "message"),
     [
-        (OSError(errno.ENOSPC, "No space left"), "out: expected room on the disk"),
+        (OSError(errno.ENOSPC, "No space left"), "out: cannot write there"),
         (OSError(errno.EIO, "Input/output error", "film.mp4"), "film.mp4"),
     ],
 )
@@ -621,9 +621,7 @@ def test_only_a_full_disk_is_called_one(
 
 def test_a_file_that_cannot_be_written_is_no_full_disk(tmp_path: Path) -> None:
     with (
-        pytest.raises(
-            InputError, match="out: expected a place to write to, got Denied"
-        ),
+        pytest.raises(InputError, match="out: cannot write there: Denied"),
         OutputFolder(tmp_path / "out", False, False, {}, print) as output,
     ):
         raise PermissionError(errno.EACCES, "Denied", str(output.building / "a.npz"))

@@ -91,7 +91,7 @@ def test_images_are_read_one_after_another():
         (b"GIF89a", "binary PGM or PPM"),
         (b"P5 3 2 65535\n" + bytes(12), "255 levels"),
         (b"P5 99999 99999 255\n", "million pixels"),
-        (b"P5 3 2 255\n" + bytes(5), "breaks off"),
+        (b"P5 3 2 255\n" + bytes(5), "the last image is incomplete"),
     ],
 )
 def test_damaged_images_are_refused(content, expected):
@@ -113,7 +113,7 @@ def test_a_stalled_stream_ends_with_one_line(monkeypatch):
     reading, writing = os.pipe()
     with (
         open(reading, "rb", buffering=0) as pipe,
-        pytest.raises(InputError, match="-: expected a frame, got none"),
+        pytest.raises(InputError, match="-: no frame arrived"),
     ):
         next(iter(Stream("-", pipe)))
     os.close(writing)
@@ -209,7 +209,9 @@ def test_masks_in_a_pipe_become_poses_on_disk_also_if_it_breaks_off(
     )
     out = tmp_path / "out"
     if damaged:
-        with pytest.raises(InputError, match="breaks off, after 39 frames"):
+        with pytest.raises(
+            InputError, match="the last image is incomplete, after 39 frames"
+        ):
             write_live(track_live(**QUICK), out)
     else:
         summary = write_live(track_live(**QUICK), out)
@@ -288,15 +290,15 @@ def test_guesses_about_a_stream_are_logged_and_the_calibrations_unit_counts(
         ({"smooth": True}, "smooth must be left out with live, got True"),
         (
             {"extraction": Extraction("median")},
-            "extraction must be given for video only, got .* for masks",
+            "extraction applies only to video, got .* for masks",
         ),
         (
             {"unit": "cm"},
-            "unit must be given for calibrations and files of motions only, got 'cm' for masks",
+            "unit applies only to calibrations and files of motions, got 'cm' for masks",
         ),
         (
             {"up": "z"},
-            "up must be given for calibrations and files of motions only, got 'z' for masks",
+            "up applies only to calibrations and files of motions, got 'z' for masks",
         ),
     ],
 )
@@ -356,7 +358,7 @@ def test_a_pipe_that_pauses_ends_the_process_with_one_line_and_keeps_its_frames(
         errors = process.stderr.read().decode()
         status = process.wait()
     assert status == 2, errors
-    assert errors.splitlines()[-1] == "posefit: -: expected a frame, got none for 0.5 s"
+    assert errors.splitlines()[-1] == "posefit: -: no frame arrived for 0.5 s"
     assert "Traceback" not in errors
     rows = (out / "frames.jsonl").read_text().splitlines()
     assert len(arrays(out / "poses.npz")["poses"]) == len(rows) > 0

@@ -223,7 +223,7 @@ def test_a_scene_is_tracked_as_it_is() -> None:
     by_name = posefit.track(motion, **how, size=(120, 90))
     np.testing.assert_array_equal(result.motion.poses, by_name.motion.poses)
     assert [frame.cost for frame in result.frames] == result.table["cost"].tolist()
-    with pytest.raises(ValueError, match="a scene must be tracked as it is, got fps"):
+    with pytest.raises(ValueError, match="must be left out for a scene, got fps"):
         posefit.track(scene, fps=20.0)
     with pytest.raises(
         ValueError,
@@ -348,7 +348,7 @@ MISUSES: list[tuple[dict[str, Any], str]] = [
         {"frames": 5},
         r"frames must be \(start, stop\), either of which may be None, got 5",
     ),
-    ({"frames": (5, 2)}, "frames must choose some of the 60 frames, got 5:2"),
+    ({"frames": (5, 2)}, "frames must contain one of the 60 frames, got 5:2"),
     (
         {"size": (320.5, 240)},
         "size must be from 1x1 to 16384x16384 pixels, got 320.5x240",
@@ -361,7 +361,7 @@ MISUSES: list[tuple[dict[str, Any], str]] = [
     ({"view_degrees": 361}, "view_degrees must lie in -360 to 360 degrees, got 361"),
     (
         {"force": True},
-        "force must be given with out, the folder of the track, got none",
+        "force needs out, the folder of the track, got none",
     ),
     (
         {"settings": ("sapso.cooling=0.9", "sapso.cooling=0.8")},
@@ -369,16 +369,16 @@ MISUSES: list[tuple[dict[str, Any], str]] = [
     ),
     (
         {"asf": "a.asf"},
-        "asf must be given for .amc files and footage only, got 'a.asf'",
+        "asf applies only to .amc files and footage, got 'a.asf'",
     ),
     (
         {"extraction": Extraction()},
-        "extraction must be given for video only, got Extraction.* for a motion",
+        "extraction applies only to video, got Extraction.* for a motion",
     ),
-    ({"up": "y"}, "up must be given for .amc and .bvh files only, got 'y'"),
-    ({"unit": "cm"}, "unit must be given for .amc and .bvh files only, got 'cm'"),
+    ({"up": "y"}, "up applies only to .amc and .bvh files, got 'y'"),
+    ({"unit": "cm"}, "unit applies only to .amc and .bvh files, got 'cm'"),
     ({"unit": "ell"}, "unit must be one of m, cm, mm, inch, foot, cmu, got 'ell'"),
-    ({"rate": 50.0}, "rate must be given for .amc files only, got 50.0"),
+    ({"rate": 50.0}, "rate applies only to .amc files, got 50.0"),
     (
         {"evaluations": 30, "method": "sapso"},
         "evaluations must hold one population of 40, got 30",

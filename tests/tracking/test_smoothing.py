@@ -197,6 +197,6 @@ def test_a_track_is_smoothed_on_demand_and_has_the_cost_of_its_smooth_poses() ->
     ]
     with pytest.raises(
         ValueError,
-        match="smooth must be given with a translation that is .* aligned, got known",
+        match="smooth needs a translation that is .* aligned, got known",
     ):
         posefit.track("walk", frames=(0, 3), smooth=True)
