@@ -3,7 +3,8 @@ const probability = (p) => (!given(p) ? "–" : p < D.constants.least_p ? `< ${D
 const neededRuns = (count) =>
   count > D.constants.max_blocks ? `more than ${whole(D.constants.max_blocks)}` : whole(count);
 const twoDigits = (value) => number(value, 2);
-const verdict = (row) => (row.adjusted >= D.constants.significance ? "no difference shown" : row.difference < 0 ? "better" : "worse");
+const verdict = (row) =>
+  row.adjusted >= D.constants.significance ? "no difference shown" : row.difference < 0 ? "better" : "worse";
 
 // Every paired test of a method, turned so that it comes first: a difference below 0 is in its favour.
 function duelsOf(m) {
