@@ -379,7 +379,7 @@ def test_images_without_a_common_number_are_refused(tmp_path: Path) -> None:
     )
     with pytest.raises(
         ValueError,
-        match="one number in the names of all cameras, got 100 to 102 of .*a and 104",
+        match="same number in the names of all cameras, got 100 to 102 of .*a and 104",
     ):
         seen(sources, camera=[camera(each) for each in VIEWS])
 

@@ -321,7 +321,10 @@ def test_a_mistake_is_reported_in_one_line_and_status_2(
             "evaluations must hold one population of 40, got 36 of sapso",
         ),
         ({"seeds": [1, 1]}, "the cells of a plan must differ, got sapso on f1"),
-        ({"dimensions": [66]}, "a plan must hold at least one cell, got none"),
+        (
+            {"dimensions": [66]},
+            "functions must exist in one of the plan's dimensions, got 1,",
+        ),
     ],
 )
 def test_a_mistake_in_a_plan_is_named_before_anything_runs(
