@@ -20,7 +20,7 @@ from posefit.evaluation.errors import Table, flagged_share, mean_known
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.quality import LAG, changed_pixels, moved_pixels
 from posefit.footage.scene import Scene
-from posefit.geometry.kernels import lessen_distances
+from posefit.geometry.kernels import lower_to_nearest
 from posefit.geometry.skeleton import JOINTS, Skeleton
 from posefit.geometry.symmetry import facing, mirrored_poses
 from posefit.motion.motion import Motion
@@ -164,7 +164,7 @@ def training_distances(
     for motion in training:
         others = motion.poses[:: max(1, round(TRAINING_SECONDS * motion.fps))].copy()
         others[:, 0] = 0.0
-        lessen_distances(joints, skeleton.joints(others), nearest)
+        lower_to_nearest(joints, skeleton.joints(others), nearest)
     return np.asarray(nearest.reshape(2, -1).min(axis=0)) / len(JOINTS)
 
 

@@ -210,8 +210,8 @@ def border_of(planes: Planes, size: tuple[int, int]) -> NDArray[np.bool_]:
 def empty_planes(count: int, size: tuple[int, int]) -> Planes:
     """Return uninitialised planes for `count` masks.
 
-    More than `PLANES_BYTES` are in a temporary file without a name. Whoever reads or
-    writes a frame of them calls `release` afterwards.
+    More than `PLANES_BYTES` are in a temporary file without a name. Call `release`
+    after reading or writing a frame of them.
 
     Raises:
         InputError: The planes need more memory than this process may use.

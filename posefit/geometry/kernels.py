@@ -343,6 +343,15 @@ def joint_positions(chain, poses, places):
     return joints
 
 
+@inlined
+def joint_distance(joints, i, j, targets, k):
+    """Return the distance of joint j of pose i from the same joint of target k."""
+    x = joints[i, j, 0] - targets[k, j, 0]
+    y = joints[i, j, 1] - targets[k, j, 1]
+    z = joints[i, j, 2] - targets[k, j, 2]
+    return math.sqrt(x * x + y * y + z * z)
+
+
 @jit
 def write_mean_distances(joints, targets, distances):
     """Write the mean distances (n, K) of joints (n, 27, 3) from others (K, 27, 3)."""
@@ -351,29 +360,23 @@ def write_mean_distances(joints, targets, distances):
         for k in range(targets.shape[0]):
             total = 0.0
             for j in range(count):
-                x = joints[i, j, 0] - targets[k, j, 0]
-                y = joints[i, j, 1] - targets[k, j, 1]
-                z = joints[i, j, 2] - targets[k, j, 2]
-                total += math.sqrt(x * x + y * y + z * z)
+                total += joint_distance(joints, i, j, targets, k)
             distances[i, k] = total / count
 
 
 @jit
-def lessen_distances(joints, targets, least):
-    """Lessen `least` (n,) to the summed distances of joints from the nearest target.
+def lower_to_nearest(joints, targets, least):
+    """Lower `least` (n,) to the summed distances of joints from the nearest target.
 
-    Joints are (n, 27, 3), and targets are (K, 27, 3). Most targets are left after a few
-    joints, because these alone are farther away than all joints of the nearest target.
+    Joints are (n, 27, 3), and targets are (K, 27, 3). The sums of most targets end
+    after a few joints, which alone are farther away than all of the nearest target.
     """
     count = joints.shape[1]
     for i in range(joints.shape[0]):
         for k in range(targets.shape[0]):
             total = 0.0
             for j in range(count):
-                x = joints[i, j, 0] - targets[k, j, 0]
-                y = joints[i, j, 1] - targets[k, j, 1]
-                z = joints[i, j, 2] - targets[k, j, 2]
-                total += math.sqrt(x * x + y * y + z * z)
+                total += joint_distance(joints, i, j, targets, k)
                 if total >= least[i]:
                     break
             least[i] = min(least[i], total)
