@@ -1,7 +1,7 @@
 """FitImage-v1 for learners: small pictures, and actions that correct a proposal."""
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium import error
@@ -13,6 +13,11 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit_envs.base import Flags, Infos
 
+if TYPE_CHECKING:
+    Wrapper = VectorWrapper[Any, Any, Any, Any, Any]
+else:
+    Wrapper = VectorWrapper  # generic only since Gymnasium 1.4
+
 Features = NDArray[np.float32]
 
 # pixels of a picture that a pixel of the small one has, in each direction
@@ -23,7 +28,7 @@ REACH = 0.3
 MOST_FAILURES = 4
 
 
-class Corrections(VectorWrapper[Any, Any, Any, Any, Any]):
+class Corrections(Wrapper):
     """A vector of FitImage-v1 in which actions correct the best proposal so far.
 
     Proposals of poses are hard to get right from a picture alone. A correction of a

@@ -16,11 +16,33 @@ MISTAKE = 2  # exit status of a user's mistake, which is shown in one line
 
 
 def open_streams() -> None:
-    """Open standard streams that are closed, on the null device."""
-    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
-        if getattr(sys, name) is None:
-            # open as long as the process lives
-            setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115
+    """Open standard streams that are closed, on the null device.
+
+    They get their usual numbers where these are free, so that processes started from
+    here have them, too: some libraries write to stderr without looking whether it is
+    there.
+    """
+    for number, (name, mode) in enumerate(
+        (("stdin", "r"), ("stdout", "w"), ("stderr", "w"))
+    ):
+        if getattr(sys, name) is not None:
+            continue
+        null = os.open(os.devnull, os.O_RDWR)
+        if null != number and not _is_open(number):
+            os.dup2(null, number)
+            os.close(null)
+            null = number
+        os.set_inheritable(null, True)
+        # open as long as the process lives
+        setattr(sys, name, open(null, mode))  # noqa: SIM115
+
+
+def _is_open(number: int) -> bool:
+    try:
+        os.fstat(number)
+    except OSError:
+        return False
+    return True
 
 
 def drop(stream: int) -> None:

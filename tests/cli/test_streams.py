@@ -50,6 +50,20 @@ def test_unreadable_messages_do_not_stop_the_work(tmp_path: Path) -> None:
         assert shell(f"posefit track wlak {redirected}").returncode == 2
 
 
+def test_processes_started_with_closed_streams_have_streams() -> None:
+    child = "import sys; print(sys.stdin is None, sys.stderr is None)"
+    parent = (
+        "import subprocess, sys; from posefit.cli.output import open_streams;"
+        f" open_streams(); subprocess.run([sys.executable, '-c', '{child}'])"
+    )
+    ran = subprocess.run(
+        ["sh", "-c", f'{sys.executable} -c "{parent}" <&- 2>&-'],
+        capture_output=True,
+        text=True,
+    )
+    assert ran.stdout.split() == ["False", "False"]
+
+
 @each("unbuffered", ["", "1"])
 def test_results_that_cannot_be_written_are_reported_in_one_line(
     unbuffered: str,
