@@ -4,6 +4,7 @@ import csv
 import zipfile
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from itertools import repeat
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ from posefit.footage.scene import observed_views
 from posefit.footage.segmentation import Segmentation
 from posefit.footage.source import films_of, scene_of, views_of_masks
 from posefit.footage.uses import useless_for
-from posefit.footage.views import Range, View, border_of
+from posefit.footage.views import Range, View, beyond, border_of
 from posefit.footage.writing import VideoWriter
 from posefit.motion.clips import FPS
 from posefit.silhouette.foreground import Image
@@ -89,12 +90,22 @@ def extract(
         if parts:
             for folder, part in zip(folders, parts, strict=True):
                 view, rows, _ = part.read(progress)
+                view = _warned(view, frames)
                 summaries.append(_written(folder, view, rows, how.name))
         else:
             views = _masks(resolved, how, frames)
             for folder, view in zip(folders, views, strict=True):
-                summaries.append(_written(folder, view))
+                summaries.append(_written(folder, _warned(view, frames)))
     return summaries[0] if len(summaries) == 1 else {"cameras": summaries}
+
+
+def _warned(view: View, frames: Range) -> View:
+    """Return a view that warns of chosen frames that the source does not have."""
+    warning = beyond(frames, int(view.numbers[0]), len(view))
+    # the scene of a motion warns, too
+    if not warning or warning in view.warnings:
+        return view
+    return replace(view, warnings=[*view.warnings, warning])
 
 
 def _written(

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple, Self, cast
 
 from posefit.errors import InputError, NoPersonError
 from posefit.footage.annotations import ANNOTATIONS
@@ -23,7 +23,7 @@ from posefit.footage.pairing import calibrated, listed
 from posefit.footage.scene import Scene, synthetic
 from posefit.footage.segmentation import Segmentation
 from posefit.footage.video import Video
-from posefit.footage.views import Range, View, together
+from posefit.footage.views import Range, View, beyond, together
 from posefit.footage.world import world_of
 from posefit.geometry.body import Body
 from posefit.geometry.calibration import Calibration
@@ -61,8 +61,12 @@ def scene_of(
     source = resolve(source)
     options = options or SourceOptions()
     if source.medium == "motion":
-        return logged(_of_motion(source, options), progress)
-    return logged(_of_footage(source, options, progress), progress)
+        scene = _of_motion(source, options)
+    else:
+        scene = _of_footage(source, options, progress)
+    if warning := beyond(options.frames, scene.first, scene.count):
+        scene = replace(scene, warnings=[*scene.warnings, warning])
+    return logged(scene, progress)
 
 
 def _of_motion(source: Resolved, options: SourceOptions) -> Scene:
@@ -85,9 +89,7 @@ def _of_footage(source: Resolved, options: SourceOptions, progress: Progress) ->
             "view_degrees must be one for footage, of its first camera, "
             f"got {len(options.degrees)}"
         )
-    # `unit` describes the calibrations if given, or else the skeleton's file
-    unit = None if options.cameras else options.unit
-    body, notes, of_height = body_of(options.asf, options.height, unit)
+    person = FilmedBody.of(options)
     how = replace(options.extraction or Extraction(), person=options.person)
     films = films_of(source, how.width, options.fps)
     filmed: Sequence[tuple[int, int] | None] = [film.filmed for film in films]
@@ -95,19 +97,13 @@ def _of_footage(source: Resolved, options: SourceOptions, progress: Progress) ->
     known = calibrated(options.cameras, filmed, source.names)
 
     def combine(views: Sequence[View]) -> Scene:
-        return combined(views, body, known, options)
+        return person.seen(views, known, options)
 
     if films:
-        scene = _of_films(films, known, how, options.frames, progress, combine)
-    else:
-        wanted = options.label if options.category is None else options.category
-        views = views_of_masks(source, options.frames, wanted, options.fps)
-        scene = combine(_of_one_person(views, known, options))
-    return replace(
-        scene,
-        warnings=[*notes, *scene.warnings],
-        guesses=[*scene.guesses, *of_height],
-    )
+        return _of_films(films, known, how, options.frames, progress, combine)
+    wanted = options.label if options.category is None else options.category
+    views = views_of_masks(source, options.frames, wanted, options.fps)
+    return combine(_of_one_person(views, known, options))
 
 
 def _placed(
@@ -275,6 +271,35 @@ def _segmented(
         # a track shows the pictures of the first camera only
         views.append(replace(view, pictures=None) if views else view)
     return views
+
+
+class FilmedBody(NamedTuple):
+    """The body of the person in footage, and what to say about it."""
+
+    body: Body
+    warnings: Sequence[str]  # about the skeleton's file
+    guesses: Sequence[str]
+
+    @classmethod
+    def of(cls, options: SourceOptions) -> Self:
+        """Return the person of some options, of which `asf` and `height` are used."""
+        # `unit` describes the calibrations if given, or else the skeleton's file
+        unit = None if options.cameras else options.unit
+        return cls(*body_of(options.asf, options.height, unit))
+
+    def seen(
+        self,
+        views: Sequence[View],
+        known: Sequence[Camera | Calibration],
+        options: SourceOptions,
+    ) -> Scene:
+        """Return the scene of this person in the views of cameras, see `combined`."""
+        scene = combined(views, self.body, known, options)
+        return replace(
+            scene,
+            warnings=[*self.warnings, *scene.warnings],
+            guesses=[*scene.guesses, *self.guesses],
+        )
 
 
 def body_of(

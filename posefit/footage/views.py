@@ -285,6 +285,27 @@ def known_planes(there: NDArray[np.bool_], size: tuple[int, int]) -> Planes | No
     return known
 
 
+def beyond(frames: Range, first: int, count: int) -> str:
+    """Return what to say if a range names frames that a source does not have, or "".
+
+    Args:
+        frames: The range, as for `span`.
+        first: Number of the first frame that is used.
+        count: How many frames are used.
+
+    """
+    start, stop = frames
+    early = start is not None and 0 <= start < first
+    late = stop is not None and stop > first + count
+    if not (early or late):
+        return ""
+    low, high = ("" if value is None else value for value in frames)
+    return (
+        f"frames {low}:{high} were chosen, and {first}:{first + count} are used: "
+        "there are no others"
+    )
+
+
 def span(frames: Range, count: int, first: int = 0) -> tuple[int, int]:
     """Return the indices (start, stop) of a range of frame numbers.
 

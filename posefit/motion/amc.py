@@ -100,6 +100,10 @@ def read_amc(
     if not (fps or stated):
         assumed = f"{FPS:g} frames a second are assumed; --rate sets it"
         notes = (f"{path}: the file does not state its rate: {assumed}",)
+    # the first frame has number 1, or 0 in some programs
+    if first > 1:
+        from_0 = "here its frames are numbered from 0"
+        notes = (*notes, f"{path}: the file's first frame is number {first}: {from_0}")
     # of the joints, as a root may turn round and round
     if said := doubtful_angles(values[:, 6:], radians=radians):
         notes = (*notes, f"{path}: {said}")

@@ -16,12 +16,11 @@ from threadpoolctl import threadpool_limits
 from posefit.errors import InputError
 from posefit.files import check_free
 from posefit.fitting.tracker import Frame, Observation
-from posefit.footage.cameras import combined
 from posefit.footage.live import Stream, live_views
 from posefit.footage.observations import Observations
 from posefit.footage.pairing import calibrated
 from posefit.footage.scene import Scene
-from posefit.footage.source import body_of, logged
+from posefit.footage.source import FilmedBody, logged
 from posefit.footage.straightening import straightening
 from posefit.footage.uses import check_used
 from posefit.footage.views import View, joined
@@ -163,11 +162,8 @@ def _scene_of(
             f"{name}: expected a person in the first {len(first)} frames, got none"
         )
     known = calibrated(options.cameras, [None])
-    unit = None if known else options.unit
-    body, notes, of_height = body_of(options.asf, options.height, unit)
-    view = replace(joined(first), warnings=notes)
-    scene = combined([view], body, known, options)
-    scene = replace(scene, name=name, guesses=[*scene.guesses, *of_height])
+    view = joined(first)
+    scene = replace(FilmedBody.of(options).seen([view], known, options), name=name)
     _, how, _ = straightening(known[0], view.size) if known else (None, None, None)
 
     def observed(live: View) -> Observation:

@@ -327,6 +327,15 @@ def test_a_mistake_is_reported_in_one_line_and_status_2(tmp_path: Path) -> None:
         (["walk", "--size", "0x9"], "size must be from 1x1"),
         (["walk", "--frames", "3"], "expected A:B"),
         (["walk", "--live", "-"], "SOURCE must be left out with --live, got walk"),
+        (["--live", "-", "--force"], "--force must be left out with --live, got it"),
+        (
+            ["--live", "-", "--write", "bvh"],
+            "--write must be left out with --live, got bvh",
+        ),
+        (
+            ["--live", "-", "--without-subject", "02", "--without-subject", "16"],
+            "--without-subject must be left out with --live, got 02, 16",
+        ),
         (["walk", "--device", "tpu"], "device must be one of cpu, cuda, got 'tpu'"),
         (["walk", "--camera", "no.json"], "no.json"),
         (

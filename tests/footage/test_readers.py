@@ -13,6 +13,7 @@ from posefit.footage.cleaning import cleaned
 from posefit.footage.kinds import resolve
 from posefit.footage.named import sources_of
 from posefit.footage.numbering import numbered
+from posefit.footage.options import SourceOptions
 from posefit.footage.source import scene_of
 from posefit.progress import Progress
 from tests.cases import each
@@ -280,6 +281,25 @@ def test_any_two_fractions_are_a_mask(
     guesses = check(tmp_path / "a.npy", walk)
     usual = values == (0.0, 1.0)
     assert guesses == ([] if usual else [f"{tmp_path / 'a.npy'}: masks of values from {min(values):g} to {max(values):g}: the person is the higher of two"])  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("frames", "used"),
+    [
+        ((6, 20), "frames 6:20 were chosen, and 6:8 are used: there are no others"),
+        ((0, 9), "frames 0:9 were chosen, and 0:8 are used: there are no others"),
+        ((6, 8), ""),
+        ((-2, None), ""),
+    ],
+)
+def test_chosen_frames_that_are_not_there_are_said(
+    walk: list[Any], frames: tuple[int, int | None], used: str
+) -> None:
+    masks = np.array([*walk, *walk])[:8]
+    scene = scene_of(masks, SourceOptions(frames=frames))
+    assert [said for said in scene.warnings if "chosen" in said] == [used] * bool(used)
+    motion = scene_of("walk", SourceOptions(frames=(40, 10_000)))
+    assert motion.warnings[-1].startswith("frames 40:10000 were chosen, and 40:")
 
 
 def test_labels_may_be_whole_numbers_held_as_fractions(

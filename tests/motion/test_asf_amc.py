@@ -403,6 +403,15 @@ def test_the_rate_is_the_files_or_given_or_assumed_and_reported(tmp_path: Path) 
         read_clip(asf, amc)
 
 
+def test_a_first_frame_with_a_later_number_is_said(tmp_path: Path) -> None:
+    walk = recorded.clip("16_15").motion()
+    asf, amc = written(tmp_path, walk.frames(4, 8))  # the file has frames 5 to 8
+    said = f"{amc}: the file's first frame is number 5: here its frames are numbered from 0"
+    assert read_clip(asf, amc).notes == (said,)
+    asf, amc = written(tmp_path, walk.frames(0, 4))
+    assert read_clip(asf, amc).notes == ()
+
+
 def test_angles_of_another_unit_than_the_file_states_are_said(tmp_path: Path) -> None:
     walk = recorded.clip("16_15").motion().frames(0, 4)
     asf, amc = written(tmp_path, walk)

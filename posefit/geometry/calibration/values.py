@@ -22,6 +22,12 @@ LARGEST_FILE = 500_000  # bytes: PyYAML reads some 100,000 a second
 # OpenCV's short floating-point types: numbers are rounded to them when they are read
 _ROUNDED = {"f": np.float32, "h": np.float16}
 _TYPE = re.compile(r"([1-9]?)([ucwsifdh])")
+# COLMAP's cameras.txt and images.txt: the comment at their top, or a camera's line with
+# its number, its model, its width and its height
+_COLMAP = re.compile(
+    r"# (Camera|Image) list with"
+    r"|\d+ \w*(PINHOLE|RADIAL|OPENCV|FOV|FISHEYE)\w* \d+ \d+ "
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +45,11 @@ class Stored:
 def stored(path: Path, text: str) -> Stored:
     """Parse a file's text. Raises InputError if it is in none of the four formats."""
     start = text.lstrip()[:100]
+    if _COLMAP.match(start):
+        raise InputError(
+            "COLMAP's text, which is not read: make a transforms.json of it, with "
+            "colmap2nerf.py of instant-ngp or ns-process-data of nerfstudio"
+        )
     suffix = path.suffix.lower()
     if suffix == ".toml":
         return Stored(path, parsed_toml(text))
