@@ -75,10 +75,7 @@ class MaskContours:
             spacing: metres between two points of a border, roughly. Points are at least
                 a pixel apart.
         """
-        far = np.maximum(camera.project(places)[1], 0.1)
-        metres = np.sqrt(camera.focal.prod()) / far
-        factor = max(int(np.median(metres) / FINE_PIXELS), 1)
-        factor = min(factor, camera.width, camera.height)
+        metres, factor = coarseness(camera, places)
         camera = coarser_camera(camera, factor)
         metres = metres / factor
         step = max(round(float(np.median(metres)) * spacing), 1)
@@ -104,6 +101,23 @@ class MaskContours:
             sizes,
             np.concatenate(points),
             starts,
+        )
+
+    def __len__(self) -> int:
+        return len(self.sizes)
+
+    def part(self, rows: slice) -> Self:
+        """Return the borders of successive frames, which share the arrays of all."""
+        first = self.starts[rows.start]
+        last = self.starts[rows.stop]
+        return replace(
+            self,
+            metres=self.metres[rows],
+            fields=self.fields[rows],
+            corners=self.corners[rows],
+            sizes=self.sizes[rows],
+            points=self.points[first:last],
+            starts=self.starts[rows.start : rows.stop + 1] - first,
         )
 
     def seen_by(self, camera: Camera) -> Self:
@@ -144,6 +158,17 @@ class MaskContours:
             grown,
             sums,
         )
+
+
+def coarseness(camera: Camera, places: Array) -> tuple[Array, int]:
+    """Return the pixels of a metre (T,) at places (T, 3), and which pixels are used.
+
+    Of a mask that is finer than needed, only every so many pixels are used.
+    """
+    far = np.maximum(camera.project(places)[1], 0.1)
+    metres = np.sqrt(camera.focal.prod()) / far
+    factor = max(int(np.median(metres) / FINE_PIXELS), 1)
+    return metres, min(factor, camera.width, camera.height)
 
 
 def _border(

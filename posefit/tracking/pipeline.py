@@ -55,6 +55,7 @@ from posefit.tracking.restarts import (
     tracked_again,
 )
 from posefit.tracking.result import Track
+from posefit.tracking.smoothing.contours import Borders
 from posefit.tracking.smoothing.legs import with_cheapest_legs
 from posefit.tracking.smoothing.smooth import Smoothed, smooth
 from posefit.tracking.trajectory import (
@@ -268,13 +269,14 @@ def _smoothed(
     Legs are only doubtful before one camera, and in footage long enough to judge them.
     `beta` is the weight in the cost.
     """
-    smoothed = smooth(*tracked, beta)
+    borders = Borders(tracked.scene.observations)
+    smoothed = smooth(*tracked, beta, borders)
     scene = smoothed.scene
     usable = sum(observation.usable for observation in scene.observations)
     if len(scene.cameras) > 1 or scene.truth is not None or usable < SHORTEST:
         return smoothed
     smoothed, exchanged = with_cheapest_legs(
-        tracked.frames, smoothed, beta, task.threads
+        tracked.frames, smoothed, beta, task.threads, borders
     )
     if exchanged.any():
         progress.log(

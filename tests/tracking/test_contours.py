@@ -1,6 +1,7 @@
 """Bodies fitted to the borders of masks: distances and gradients by slow twins, and bodies that come back."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,7 +28,12 @@ from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 from posefit.tracking.pipeline import with_turns
 from posefit.tracking.smoothing import contours
-from posefit.tracking.smoothing.contours import fit_contours, growth, turned_camera
+from posefit.tracking.smoothing.contours import (
+    Borders,
+    fit_contours,
+    growth,
+    turned_camera,
+)
 from posefit.tracking.smoothing.path import Visibility
 from posefit.tracking.smoothing.smooth import smooth
 from posefit.uncertainty.calibration import Recalibration
@@ -581,3 +587,38 @@ def test_poses_of_a_frame_are_fitted_alike_alone_together_and_by_several_threads
         np.testing.assert_array_equal(part, whole)
     for part, whole in zip(moved(slice(4, 5), 1), together, strict=True):
         np.testing.assert_array_equal(part[0], whole[4])
+
+
+def test_fits_share_the_borders_of_a_window(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene, motion = footage()
+    observations = list(scene.observations)
+    # a frame that shows nothing has no points
+    observations[6] = replace(observations[6], usable=False)
+    (camera,) = scene.cameras
+    traced = []
+
+    def of(camera: Camera, view: int, shown: Any, *rest: Any) -> MaskContours:
+        traced.append(len(shown))
+        return original(camera, view, shown, *rest)
+
+    original = MaskContours.of
+    monkeypatch.setattr(MaskContours, "of", of)
+    borders = Borders(observations)
+    every = np.arange(len(motion))
+    borders.of(camera, 0, every, motion.translations)
+    places = motion.translations[4:10]
+    part = borders.starting_at(3).of(camera, 0, np.arange(1, 7), places)
+    assert traced == [len(motion)]
+    alone = original(camera, 0, observations[4:10], places)
+    assert len(part) == len(alone) == 6
+    for name in ("metres", "corners", "sizes", "points", "starts"):
+        np.testing.assert_array_equal(getattr(part, name), getattr(alone, name))
+    for k, (rows, columns) in enumerate(alone.sizes.tolist()):
+        box = np.s_[k, :rows, :columns]
+        np.testing.assert_array_equal(part.fields[box], alone.fields[box])
+    # of other frames, only those that were asked for are kept
+    few = Borders(observations)
+    few.of(camera, 0, every[:5], motion.translations[:5])
+    few.of(camera, 0, every[4:9], motion.translations[4:9])
+    few.of(camera, 0, every[:5], motion.translations[:5])
+    assert traced == [len(motion), 5, 5, 5]

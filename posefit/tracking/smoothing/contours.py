@@ -6,8 +6,11 @@ of the masks. The build, and small turns of several cameras, are fitted too. The
 the same in all frames.
 """
 
+import threading
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
+from typing import Self
 
 import cv2
 import numpy as np
@@ -19,6 +22,7 @@ from posefit.fitting.contours import (
     MAX_ANGLE_STEP,
     ROBUST_SCALES,
     MaskContours,
+    coarseness,
     contour_squares,
 )
 from posefit.fitting.shape import (
@@ -30,6 +34,7 @@ from posefit.fitting.shape import (
     Shape,
     shaped,
 )
+from posefit.fitting.tracker import Observation
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
@@ -92,6 +97,55 @@ def growth(body: Body, height: float | None, motion: Motion) -> tuple[Array, Arr
     return joint_changes, radius_changes
 
 
+class Borders:
+    """The borders of a film's masks, which fits of the same frames share.
+
+    Tracing them takes as long as several steps of a fit. Only those of one window are
+    kept, so that a long film takes no more memory than a window does.
+    """
+
+    def __init__(self, observations: Sequence[Observation]) -> None:
+        self._observations = observations
+        self._start = 0  # the frame that is counted as 0
+        # by view: the first frame, its borders and those of the next frames, and which
+        # of the pixels are used
+        self._kept: dict[int, tuple[int, MaskContours, int]] = {}
+        # without it, two threads that need the same borders would both trace them
+        self._tracing = threading.Lock()
+
+    def starting_at(self, frame: int) -> Self:
+        """Return the same borders, with frames counted from this one."""
+        later = copy(self)
+        later._start = self._start + frame
+        return later
+
+    def of(
+        self, camera: Camera, view: int, rows: NDArray[np.int64], places: Array
+    ) -> MaskContours:
+        """Return the borders of successive frames in the masks of a camera.
+
+        Args:
+            camera: The camera.
+            view: Its number.
+            rows: (n,) the frames.
+            places: (n, 3) places of the person's root, roughly.
+
+        """
+        first = self._start + int(rows[0])
+        last = self._start + int(rows[-1])
+        metres, factor = coarseness(camera, places)
+        with self._tracing:
+            start, kept, used = self._kept.get(view, (0, None, 0))
+            inside = kept is not None and start <= first and last < start + len(kept)
+            if kept is None or used != factor or not inside:
+                start = first
+                shown = [self._observations[k] for k in range(first, last + 1)]
+                kept = MaskContours.of(camera, view, shown, places)
+                self._kept[view] = start, kept, factor
+        part = kept.part(slice(first - start, last + 1 - start))
+        return replace(part.seen_by(camera), metres=metres / factor)
+
+
 @dataclass(frozen=True, eq=False)
 class _Part:
     """The frames of a window, with what is fitted in them."""
@@ -115,6 +169,7 @@ def fit_contours(
     shape: Shape | None,
     beta: float = BETA,
     scales: Sequence[float] = ROBUST_SCALES,
+    borders: Borders | None = None,
 ) -> tuple[Scene, Motion, Shape | None]:
     """Return a steady motion fitted to the borders of a scene's masks.
 
@@ -130,6 +185,7 @@ def fit_contours(
         shape: The build if it was fitted, or None if it is known; it is then held.
         beta: The weight in the cost, see `posefit.silhouette.cost`.
         scales: The reach of each step, metres.
+        borders: The borders of the scene's masks, if other fits share them.
 
     Returns:
         The scene with the fitted body and cameras, the motion, and the build.
@@ -137,13 +193,14 @@ def fit_contours(
     """
     if len(motion) < 3 or not visibility.usable.any():
         return scene, motion, shape
+    borders = borders or Borders(scene.observations)
     parts = windows_over(len(motion), CONTOUR_WINDOW, CONTOUR_OVERLAP)
     fitted: dict[int, _Part] = {}
     if shape is not None or scene.cameras_turn:
         best = int(np.argmax([visibility.usable[rows].sum() for rows, _ in parts]))
-        part = fitted[best] = _fitted(
-            scene, motion, visibility, parts[best][0], shape, beta, scales, turned=True
-        )
+        rows = parts[best][0]
+        start = _part_of(scene, motion, visibility, rows, shape, turned=True)
+        part = fitted[best] = _fitted(start, scene, rows, borders, beta, scales)
         # else no build fits better, and only poses are fitted
         if shape is not None and part.body is not scene.body:
             spread = np.minimum(np.hypot(part.spread, MODEL_SPREAD), SPREAD)
@@ -154,9 +211,10 @@ def fit_contours(
     poses = motion.poses.copy()
     places = motion.translations.copy()
     for k, (rows, inner) in enumerate(parts):
-        part = fitted.get(k) or _fitted(
-            scene, motion, visibility, rows, None, beta, scales
-        )
+        part = fitted.get(k)
+        if part is None:
+            start = _part_of(scene, motion, visibility, rows, None)
+            part = _fitted(start, scene, rows, borders, beta, scales)
         poses[rows[inner]] = part.fitted.poses[inner]
         places[rows[inner]] = part.fitted.translations[inner]
     skeleton = scene.body.skeleton
@@ -164,54 +222,59 @@ def fit_contours(
     return scene, fitted_motion, shape
 
 
-def _fitted(
+def _part_of(
     scene: Scene,
     motion: Motion,
     visibility: Visibility,
     rows: NDArray[np.int64],
     shape: Shape | None,
-    beta: float,
-    scales: Sequence[float],
     turned: bool = False,
 ) -> _Part:
-    """Return some frames of a motion after the best step.
+    """Return some frames of a motion before they are fitted.
 
-    The build is fitted too unless `shape` is None, and the cameras if `turned`.
+    The build will be fitted too unless `shape` is None, and the cameras if `turned`.
     """
-    body = scene.body
-    cameras = scene.cameras
     estimate = replace(
         motion,
-        skeleton=body.skeleton,
+        skeleton=scene.body.skeleton,
         poses=motion.poses[rows],
         translations=motion.translations[rows],
     )
-    observations = [scene.observations[k] for k in rows.tolist()]
-    places = estimate.translations
-    borders = [
-        MaskContours.of(camera, view, observations, places)
-        for view, camera in enumerate(cameras)
-    ]
     factors = np.empty(0) if shape is None else np.log(shape.factors)
-    height = None if shape is None else shape.height
-    turns = np.zeros((len(cameras) if turned and scene.cameras_turn else 0, 3))
-    spread = np.zeros(len(factors))
-    part = _Part(
+    turning = turned and scene.cameras_turn
+    return _Part(
         estimate,
         estimate,
-        body,
+        scene.body,
         factors,
-        height,
+        None if shape is None else shape.height,
         visibility.at(rows),
-        spread,
-        cameras,
-        turns,
+        np.zeros(len(factors)),
+        scene.cameras,
+        np.zeros((len(scene.cameras) if turning else 0, 3)),
     )
-    best = part
+
+
+def _fitted(
+    part: _Part,
+    scene: Scene,
+    rows: NDArray[np.int64],
+    borders: Borders,
+    beta: float,
+    scales: Sequence[float],
+) -> _Part:
+    """Return some frames of a scene after the best step from a start."""
+    places = part.estimate.translations
+    contours = [
+        borders.of(camera, view, rows, places)
+        for view, camera in enumerate(scene.cameras)
+    ]
+    observations = (scene.observations[k] for k in rows.tolist())
     usable = ObservedFrames.of(each for each in observations if each.usable)
+    best = part
     least = _mean_cost(part, usable, beta)
     for scale in scales:
-        part = _stepped(part, borders, scale)
+        part = _stepped(part, contours, scale)
         if (cost := _mean_cost(part, usable, beta)) < least:
             best = part
             least = cost

@@ -24,6 +24,7 @@ from posefit.geometry.skeleton import JOINTS, LIMBS, root_centred
 from posefit.geometry.symmetry import exchanged_limbs, mirrored_poses
 from posefit.motion.motion import Motion
 from posefit.silhouette.sharing import shares_of, work_through
+from posefit.tracking.smoothing.contours import Borders
 from posefit.tracking.smoothing.smooth import Smoothed, drawn, smooth, smoothed_motion
 from posefit.tracking.trajectory import cheapest_sequence, mean_cost
 from posefit.uncertainty.calibration import SECOND_SIDE
@@ -51,7 +52,11 @@ LEG_JOINTS = [
 
 
 def with_cheapest_legs(
-    tracked: Sequence[Frame], smoothed: Smoothed, beta: float, threads: int = 1
+    tracked: Sequence[Frame],
+    smoothed: Smoothed,
+    beta: float,
+    threads: int = 1,
+    borders: Borders | None = None,
 ) -> tuple[Smoothed, NDArray[np.bool_]]:
     """Return smoothed frames with legs exchanged wherever that is cheaper.
 
@@ -63,6 +68,7 @@ def with_cheapest_legs(
         smoothed: The same, smoothed.
         beta: The weight in the cost, see `posefit.silhouette.cost`.
         threads: Number of threads. Does not change the result.
+        borders: The borders of the scene's masks, if other fits share them.
 
     Returns:
         The smoothed frames, and whether legs are exchanged in each of them (T,).
@@ -70,10 +76,11 @@ def with_cheapest_legs(
     """
     scene = smoothed.scene
     shape = smoothed.shape
+    borders = borders or Borders(scene.observations)
     usable = np.array([observation.usable for observation in scene.observations])
     changed = np.zeros(len(tracked), dtype=bool)
     for _ in range(ROUNDS):
-        exchanged = legs_exchanged(smoothed, tracked, usable, beta, threads)
+        exchanged = legs_exchanged(smoothed, tracked, usable, beta, threads, borders)
         pairs = zip(tracked, exchanged, strict=True)
         frames = [
             _exchanged(smoothed.scene, frame) if other else frame
@@ -81,7 +88,7 @@ def with_cheapest_legs(
         ]
         if not exchanged.any():
             break
-        again = smooth(scene, frames, shape, beta)
+        again = smooth(scene, frames, shape, beta, borders)
         if mean_cost(again.frames, usable) >= mean_cost(smoothed.frames, usable):
             break
         tracked = frames
@@ -98,6 +105,7 @@ def legs_exchanged(
     usable: NDArray[np.bool_],
     beta: float,
     threads: int = 1,
+    borders: Borders | None = None,
 ) -> NDArray[np.bool_]:
     """Return in which frames (T,) exchanged legs are cheaper.
 
@@ -107,9 +115,11 @@ def legs_exchanged(
         usable: (T,) whether a frame shows enough of the person.
         beta: The weight in the cost, see `posefit.silhouette.cost`.
         threads: Number of threads. Does not change the result.
+        borders: The borders of the scene's masks, if other fits share them.
 
     """
     scene = smoothed.scene
+    borders = borders or Borders(scene.observations)
     costs = np.array([frame.cost for frame in smoothed.frames]) * usable
     pairs = [frames, [_exchanged(scene, frame) for frame in frames]]
     here, there = (scene.motion(each) for each in pairs)
@@ -117,13 +127,13 @@ def legs_exchanged(
     odds = _odds(scene, here)
     reach = max(round(TRIAL_SECONDS * scene.fps), 2)
     # a few steps are enough to see which stretches are beyond doubt
-    (quick,) = _smoothed_costs(scene, [there], beta, QUICK_SCALES)
+    (quick,) = _smoothed_costs(scene, [there], beta, borders, QUICK_SCALES)
     near = max(round(DOUBT_SECONDS * scene.fps), 1)
     edges, anything = in_doubt(edges, near, costs, quick - costs + odds, usable)
     if not anything:
         return np.zeros(len(frames), dtype=bool)
     costs_there, costs_here = _smoothed_costs(
-        scene, [there, here], beta, threads=threads
+        scene, [there, here], beta, borders, threads=threads
     )
     added = costs_there - costs_here
     exchanged = np.zeros(len(frames), dtype=np.int64)
@@ -143,7 +153,9 @@ def legs_exchanged(
             which = [*earlier, *[later] * (rows.stop - edge)]
             trial = [pairs[w][k] for w, k in zip(which, rows, strict=True)]
             trials.append(window.motion(trial))
-        same, other = _smoothed_costs(window, trials, beta, threads=threads)
+        same, other = _smoothed_costs(
+            window, trials, beta, borders.starting_at(rows.start), threads=threads
+        )
         later_cost = added[edge : rows.stop].sum()
         switch = other.sum() - same.sum() - (-later_cost if side else later_cost)
         switches.append(abs(switch))
@@ -298,6 +310,7 @@ def _smoothed_costs(
     scene: Scene,
     motions: Sequence[Motion],
     beta: float,
+    borders: Borders,
     scales: Sequence[float] = ROBUST_SCALES,
     threads: int = 1,
 ) -> Array:
@@ -312,7 +325,7 @@ def _smoothed_costs(
     def smooth_part(part: slice) -> None:
         for number in range(part.start, part.stop):
             fitted, motion, _ = smoothed_motion(
-                scene, motions[number], None, beta, scales
+                scene, motions[number], None, beta, scales, borders
             )
             if len(rows):
                 _, costs[number, rows] = drawn(fitted, motion, rows, beta)

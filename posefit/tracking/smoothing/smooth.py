@@ -16,7 +16,7 @@ from posefit.footage.scene import Scene
 from posefit.geometry.rotation import wrapped
 from posefit.motion.motion import Motion
 from posefit.silhouette.mask import Areas
-from posefit.tracking.smoothing.contours import fit_contours
+from posefit.tracking.smoothing.contours import Borders, fit_contours
 from posefit.tracking.smoothing.path import Visibility, smooth_path
 from posefit.tracking.trajectory import mean_cost
 
@@ -34,7 +34,11 @@ class Smoothed(NamedTuple):
 
 
 def smooth(
-    scene: Scene, frames: Sequence[Frame], shape: Shape | None, beta: float
+    scene: Scene,
+    frames: Sequence[Frame],
+    shape: Shape | None,
+    beta: float,
+    borders: Borders | None = None,
 ) -> Smoothed:
     """Return the frames of a scene, smoothed.
 
@@ -46,10 +50,13 @@ def smooth(
         frames: Its tracked frames.
         shape: The person's build if it was fitted, or None if it is known.
         beta: The weight in the cost, see `posefit.silhouette.cost`.
+        borders: The borders of the scene's masks, if other fits share them.
 
     """
     visibility = Visibility.of(scene)
-    scene, motion, shape = smoothed_motion(scene, scene.motion(frames), shape, beta)
+    scene, motion, shape = smoothed_motion(
+        scene, scene.motion(frames), shape, beta, borders=borders
+    )
     # once more, because the contours pull at standing feet
     motion = smooth_path(motion, visibility)
     areas, costs = drawn(scene, motion, np.arange(len(motion)), beta)
@@ -99,6 +106,7 @@ def smoothed_motion(
     shape: Shape | None,
     beta: float,
     scales: Sequence[float] = ROBUST_SCALES,
+    borders: Borders | None = None,
 ) -> tuple[Scene, Motion, Shape | None]:
     """Return a motion smoothed and fitted to the contours, with its scene and build.
 
@@ -108,6 +116,7 @@ def smoothed_motion(
         shape: The person's build if it was fitted, or None if it is known.
         beta: The weight in the cost, see `posefit.silhouette.cost`.
         scales: The reach of each step of the fit, metres.
+        borders: The borders of the scene's masks, if other fits share them.
 
     """
     visibility = Visibility.of(scene)
@@ -118,6 +127,7 @@ def smoothed_motion(
         shape,
         beta,
         scales,
+        borders,
     )
 
 
@@ -127,16 +137,34 @@ def steadied(motion: Motion, visibility: Visibility) -> Motion:
     The silhouettes of a single camera leave most open, so that angles shake from one
     frame to the next. The filter is a Gaussian over time.
     """
-    from scipy.ndimage import gaussian_filter1d
-
-    angles = gaussian_filter1d(
-        np.unwrap(motion.poses, axis=0),
-        STEADY_SECONDS * motion.fps,
-        axis=0,
-        mode="nearest",
-    )
+    angles = filtered(np.unwrap(motion.poses, axis=0), STEADY_SECONDS * motion.fps)
     alone = np.isfinite(visibility.viewpoints[:, :1])  # (T, 1)
     return replace(motion, poses=np.where(alone, angles, motion.poses))
+
+
+def filtered(series: Array, deviation: float) -> Array:
+    """Return a series (T, n) after a Gaussian filter over its frames.
+
+    Before the first and after the last frame, these are held. SciPy's `ndimage` has the
+    filter, too, but takes 0.1 s to import.
+
+    Args:
+        series: The series.
+        deviation: The filter's standard deviation in frames, more than 0.
+
+    """
+    reach = int(4.0 * deviation + 0.5)
+    weights = np.exp(-0.5 / deviation**2 * np.arange(-reach, reach + 1) ** 2)
+    weights /= weights.sum()
+    held = np.pad(series, ((reach, reach), (0, 0)), mode="edge")
+    count = len(series)
+    result = weights[reach] * series
+    # both frames at a distance have one weight
+    for apart in range(reach, 0, -1):
+        before = held[reach - apart :][:count]
+        after = held[reach + apart :][:count]
+        result += weights[reach + apart] * (before + after)
+    return np.asarray(result)
 
 
 def _moved(frame: Frame, pose: Array, place: Array, cost: float, areas: Areas) -> Frame:
