@@ -6,9 +6,10 @@ pictures, and with the learned background if the segmenter has one.
 
 from collections import deque
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, Self
 
 import cv2
 import numpy as np
@@ -48,6 +49,25 @@ CHANGE_PERCENTILE = 90
 GHOSTS = 0.1
 
 
+class Changes:
+    """Which pixels changed between two frames, found once for all people in them."""
+
+    def __init__(self) -> None:
+        self._frames: tuple[int, int] | None = None  # the latest pair
+        self._changed: Mask | None = None
+
+    def between(self, earlier: tuple[int, Image], now: tuple[int, Image]) -> Mask:
+        """Return `changed_pixels` of two frames, given by their numbers and pictures.
+
+        A number stands for one picture only.
+        """
+        frames = earlier[0], now[0]
+        if self._changed is None or frames != self._frames:
+            self._changed = changed_pixels(now[1], earlier[1])
+            self._frames = frames
+        return self._changed
+
+
 class FrameQuality:
     """Compares masks with their pictures. Its rows become quality.csv."""
 
@@ -65,9 +85,19 @@ class FrameQuality:
         """
         self._still = still
         self._edges = None if background is None else _edges(background)
-        self._before: deque[tuple[Image, Mask]] = deque(maxlen=max(1, round(LAG * fps)))
+        self._changes = Changes()
+        lag = max(1, round(LAG * fps))
+        self._before: deque[tuple[int, Image, Mask]] = deque(maxlen=lag)
         self._areas: deque[int] = deque(maxlen=AREA_FRAMES)
         self._sides: deque[int] = deque(maxlen=AREA_FRAMES)
+
+    def duplicate(self) -> Self:
+        """Return the same comparison, to continue with another person's masks."""
+        other = copy(self)
+        other._before = self._before.copy()
+        other._areas = self._areas.copy()
+        other._sides = self._sides.copy()
+        return other
 
     def row(self, image: Image, person: Person, frame: int) -> dict[str, Any]:
         """Return the row of quality.csv for the next frame.
@@ -76,7 +106,7 @@ class FrameQuality:
         moves, and has about the area of earlier masks that may be a person.
         """
         side = max(cv2.boundingRect(person.mask.astype(np.uint8))[2:])
-        outside = self._outside(image, person, side)
+        outside = self._outside(frame, image, person, side)
         ghost = self._is_ghost(image, person.mask)
         whole = person.area > 0 and not person.touches_border
         likely = (
@@ -92,7 +122,7 @@ class FrameQuality:
             self._areas.append(person.area)
         if whole:
             self._sides.append(side)
-        self._before.append((image, person.mask))
+        self._before.append((frame, image, person.mask))
         return {
             "frame": frame,
             "area": person.area,
@@ -106,14 +136,15 @@ class FrameQuality:
             "usable": int(likely and jitter <= AREA_CHANGE),
         }
 
-    def _outside(self, image: Image, person: Person, side: int) -> float:
+    def _outside(self, frame: int, image: Image, person: Person, side: int) -> float:
         """Return the share of the moving pixels near the person outside the mask."""
         if not self._still or not self._before or not person.area:
             return 0.0
-        earlier, mask = self._before[0]
+        number, before, mask = self._before[0]
         covered = person.mask | mask
         reach = max(side, *self._sides) if self._sides else side
-        changed = changed_pixels(image, earlier) & person.valid
+        changed = self._changes.between((number, before), (frame, image))
+        changed = changed & person.valid
         moved, inside = moved_pixels(changed, covered, covered, reach, SLACK)
         outside = moved - inside
         return outside / moved if moved else 0.0

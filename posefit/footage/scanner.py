@@ -1,7 +1,6 @@
 """A pass through some frames of a video, which finds the people in each of them."""
 
 from collections.abc import Callable, Iterator, Sequence
-from copy import deepcopy
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -156,7 +155,7 @@ class _Rows:
         self.largest = list[dict[str, Any]]()
         self._scanner = scanner
         self._of_blanks = scanner.segmenter.quality()
-        self._of_largest = scanner.segmenter.quality()
+        self._of_largest = self._of_blanks.duplicate()
         # of the people who may be in the next frame
         self._of_people = dict[Tracklet, FrameQuality]()
 
@@ -183,7 +182,7 @@ class _Rows:
         qualities = dict[Tracklet, FrameQuality]()
         for tracklet in people.active:
             # a new person was in none of the earlier frames
-            quality = self._of_people.get(tracklet) or deepcopy(self._of_blanks)
+            quality = self._of_people.get(tracklet) or self._of_blanks.duplicate()
             qualities[tracklet] = quality
             person = empty
             if tracklet in present:

@@ -223,13 +223,15 @@ def of(mask: Any) -> Person:
     return Person(mask, np.ones_like(mask), int(mask.sum()), 1, 0.0, False)
 
 
-def test_a_mask_is_not_usable_if_most_motion_is_outside_it() -> None:
-    def arm(mask: Any) -> Any:
-        part = mask.copy()
-        part[45:] = False
-        part[:, : np.flatnonzero(mask.any(axis=0))[12]] = False
-        return part
+def arm(mask: Any) -> Any:
+    """Return a small part of a figure's mask."""
+    part = mask.copy()
+    part[45:] = False
+    part[:, : np.flatnonzero(mask.any(axis=0))[12]] = False
+    return part
 
+
+def test_a_mask_is_not_usable_if_most_motion_is_outside_it() -> None:
     quality = FrameQuality(30.0)
     rows = [
         quality.row(image, of(arm(mask)), k)
@@ -288,6 +290,22 @@ def test_a_place_that_the_person_has_left_is_a_ghost() -> None:
         FrameQuality(30.0, background=empty).row(with_person, of(mask), 0)["ghost"] == 0
     )
     assert FrameQuality(30.0).row(empty, of(mask), 0)["ghost"] == 0
+
+
+def test_people_of_one_film_are_judged_as_if_each_were_alone() -> None:
+    figures = [figure(6 * k) for k in range(8)]
+    whole = FrameQuality(30.0)
+    arms = whole.duplicate()
+    alone = FrameQuality(30.0)
+    later = whole
+    for k, (image, mask) in enumerate(figures):
+        # somebody who appears in the fourth frame begins like the first one
+        if k == 3:
+            later = whole.duplicate()
+        row = whole.row(image, of(mask), k)
+        assert arms.row(image, of(arm(mask)), k) == alone.row(image, of(arm(mask)), k)
+        if k >= 3:
+            assert later.row(image, of(mask), k) == row
 
 
 def test_one_mask_twice_as_large_as_the_others_is_not_usable_but_a_person_who_stays_so_is() -> (
