@@ -86,12 +86,18 @@ def _owners(
     large = np.flatnonzero(areas > MIN_PIECE_AREA * areas.max())
     reach = PIECE_REACH * stats[large, cv2.CC_STAT_HEIGHT]
     shown = labels > 0
+    # the pixels of the pieces, one piece after the other, and where each begins; short
+    # numbers are sorted in a tenth of the time
+    pixels = np.flatnonzero(shown)
+    owned = labels.ravel()[pixels].astype(np.min_scalar_type(count))
+    pixels = pixels[np.argsort(owned, kind="stable")]
+    starts = np.cumsum(np.bincount(owned, minlength=count))[:-1]
     # pixels from each large piece to every piece
     distances = np.full((len(large), count), np.inf)
     for row, number in enumerate(large.tolist()):
         apart = (labels != number).astype(np.uint8)
         away = cv2.distanceTransform(apart, cv2.DIST_L2, 3)
-        np.minimum.at(distances[row], labels[shown], away[shown])
+        distances[row, 1:] = np.minimum.reduceat(away.ravel()[pixels], starts)
     joined = distances[:, large] <= np.maximum(reach[:, None], reach)
     if known is not None:
         # pieces are joined if they are one component together with the unknown pixels
