@@ -404,18 +404,32 @@ def _moments(
         kept: Gets the frames that it wants.
 
     """
-    capture = cv2.VideoCapture(opencv_name(path))
     times = list[float]()
-    while capture.grab():
-        number = len(times)
-        times.append(capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3)
-        if not kept.takes(number):
-            continue
-        read, image = capture.retrieve()
-        if read and (image.shape[1], image.shape[0]) == filmed:
+    # a second core decodes the next frames while this one is scaled and kept
+    for number, (seconds, image) in enumerate(ahead(_timed(path, kept))):
+        times.append(seconds)
+        if image is not None and (image.shape[1], image.shape[0]) == filmed:
             kept.add(number, scaled(image, size))
-    capture.release()
     return np.array(times)
+
+
+def _timed(path: Path, kept: KeptFrames) -> Iterator[tuple[float, Image | None]]:
+    """Yield when each frame of a file is shown, in seconds, and its picture.
+
+    The picture is None if it is not to be kept, or is damaged.
+    """
+    capture = cv2.VideoCapture(opencv_name(path))
+    number = 0
+    try:
+        while capture.grab():
+            seconds = capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3
+            image: Any = None
+            if kept.takes(number):
+                _, image = capture.retrieve()
+            yield seconds, image
+            number += 1
+    finally:
+        capture.release()
 
 
 def ahead(items: Iterator[Item]) -> Iterator[Item]:
