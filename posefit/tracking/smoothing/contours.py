@@ -211,10 +211,11 @@ def fit_contours(
     poses = motion.poses.copy()
     places = motion.translations.copy()
     for k, (rows, inner) in enumerate(parts):
-        part = fitted.get(k)
-        if part is None:
+        if k not in fitted:
             start = _part_of(scene, motion, visibility, rows, None)
             part = _fitted(start, scene, rows, borders, beta, scales)
+        else:
+            part = fitted[k]
         poses[rows[inner]] = part.fitted.poses[inner]
         places[rows[inner]] = part.fitted.translations[inner]
     skeleton = scene.body.skeleton
