@@ -125,13 +125,13 @@ def _track_live(
     # a session always writes the same two files, and cannot be continued
     for name in ("force", "resume", "write", "without_subject"):
         if options[name]:
-            flag = f"--{name.replace('_', '-')}"
+            flag = name.replace("_", "-")
             came = options[name]
             if came is True:
                 came = "it"
             elif not isinstance(came, str):
                 came = ", ".join(came)
-            raise InputError(f"{flag} must be left out with --live, got {came}")
+            raise InputError(f"--{flag} must be left out with --live, got {came}")
     out = options["out"]
     # live frames are treated like a video's
     chosen = _arguments(options, "video")
