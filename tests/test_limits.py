@@ -1,6 +1,8 @@
 """Limits of time end what runs Python, nest, and let nothing swallow them."""
 
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 
@@ -79,3 +81,10 @@ def test_a_process_may_have_no_more_than_its_limit_and_the_machine_leave() -> No
     with memory(0.9 * machine / 1e9):
         assert allowed_bytes() == int(0.9 * machine / 1e9 * 1e9)
     assert allowed_bytes() == machine
+
+
+def test_threads_share_a_heap_where_the_c_library_can() -> None:
+    # in another process, because it holds for the whole process; elsewhere it does
+    # nothing
+    code = "from posefit.limits import share_heap; share_heap()"
+    subprocess.run([sys.executable, "-c", code], check=True)

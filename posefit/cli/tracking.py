@@ -22,6 +22,7 @@ from posefit.cli.options import (
 )
 from posefit.cli.output import progress, results_alone, say
 from posefit.errors import InputError
+from posefit.limits import share_heap
 from posefit.progress import Progress
 
 if TYPE_CHECKING:
@@ -63,6 +64,7 @@ def track(
     """  # noqa: D301
     from posefit.tracking.front import track as run
 
+    share_heap()
     logging.getLogger("posefit").disabled = quiet
     shown = Progress() if quiet else Progress(say, progress)
     if live is not None:
