@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import NoPersonError
-from posefit.footage.assignment import cheapest_pairs
 from posefit.footage.views import unpacked
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask, padded_box
@@ -340,8 +339,17 @@ def _owners(
     distances = np.array(
         [[tracklet.distance(blob, frame) for blob in blobs] for tracklet in tracklets]
     )
+    if 1 in distances.shape:
+        # one person or one blob: the nearest pair is the assignment
+        pairs = [divmod(int(distances.argmin()), len(blobs))]
+    else:
+        # takes a third of a second to import
+        from scipy.optimize import linear_sum_assignment
+
+        rows, columns = linear_sum_assignment(np.minimum(distances, UNREACHABLE))
+        pairs = list(zip(rows.tolist(), columns.tolist(), strict=True))
     owners = dict[int, Tracklet]()
-    for row, column in cheapest_pairs(np.minimum(distances, UNREACHABLE)):
+    for row, column in pairs:
         if np.isfinite(distances[row, column]):
             owners[column] = tracklets[row]
     return owners

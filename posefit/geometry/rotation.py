@@ -100,22 +100,10 @@ def quaternions(rotations: Array) -> Array:
 
     Of the two quaternions of a rotation, the nearer to the one before is taken.
     """
-    trace = np.trace(rotations, axis1=1, axis2=2)
-    # 4 times the products (T, 4, 4) of a quaternion's numbers with each other: each row
-    # is a multiple of the quaternion, and the one with the largest square is exact
-    products = np.empty((len(rotations), 4, 4))
-    products[:, :3, :3] = rotations + np.swapaxes(rotations, 1, 2)
-    for axis in range(3):
-        after = (axis + 1) % 3
-        last = (axis + 2) % 3
-        products[:, axis, axis] = 1.0 - trace + 2.0 * rotations[:, axis, axis]
-        twice = rotations[:, last, after] - rotations[:, after, last]
-        products[:, axis, 3] = twice
-        products[:, 3, axis] = twice
-    products[:, 3, 3] = 1.0 + trace
-    largest = np.diagonal(products, axis1=1, axis2=2).argmax(axis=1)
-    chosen = products[np.arange(len(rotations)), largest]
-    chosen = chosen / np.linalg.norm(chosen, axis=1, keepdims=True)
+    # imported here, because it takes a quarter of a second
+    from scipy.spatial.transform import Rotation
+
+    chosen = Rotation.from_matrix(rotations).as_quat()
     turned = np.where((chosen[1:] * chosen[:-1]).sum(axis=1) < 0.0, -1.0, 1.0)
     return np.asarray(chosen * np.cumprod(np.append(1.0, turned))[:, None])
 
