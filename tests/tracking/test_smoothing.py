@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.ndimage import gaussian_filter1d
 
 import posefit
 from posefit.arrays import Array
@@ -14,7 +13,7 @@ from posefit.motion.motion import Motion
 from posefit.motion.steadiness import acceleration, slides, standing
 from posefit.tracking.smoothing import path
 from posefit.tracking.smoothing.path import Squares, Visibility, smooth_path
-from posefit.tracking.smoothing.smooth import filtered, steadied
+from posefit.tracking.smoothing.smooth import steadied
 
 VIEWPOINT = np.array([0.0, 1.0, 6.0])
 
@@ -201,10 +200,3 @@ def test_a_track_is_smoothed_on_demand_and_has_the_cost_of_its_smooth_poses() ->
         match="smooth needs a translation that is .* aligned, got known",
     ):
         posefit.track("walk", frames=(0, 3), smooth=True)
-
-
-@pytest.mark.parametrize("deviation", [0.05, 0.8, 1.0, 4.0])
-def test_the_filter_of_angles_is_scipys(deviation: float) -> None:
-    series = np.random.default_rng(0).normal(size=(9, 4))
-    expected = gaussian_filter1d(series, deviation, axis=0, mode="nearest")
-    np.testing.assert_allclose(filtered(series, deviation), expected, rtol=1e-12)

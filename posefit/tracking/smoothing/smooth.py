@@ -137,34 +137,16 @@ def steadied(motion: Motion, visibility: Visibility) -> Motion:
     The silhouettes of a single camera leave most open, so that angles shake from one
     frame to the next. The filter is a Gaussian over time.
     """
-    angles = filtered(np.unwrap(motion.poses, axis=0), STEADY_SECONDS * motion.fps)
+    from scipy.ndimage import gaussian_filter1d
+
+    angles = gaussian_filter1d(
+        np.unwrap(motion.poses, axis=0),
+        STEADY_SECONDS * motion.fps,
+        axis=0,
+        mode="nearest",
+    )
     alone = np.isfinite(visibility.viewpoints[:, :1])  # (T, 1)
     return replace(motion, poses=np.where(alone, angles, motion.poses))
-
-
-def filtered(series: Array, deviation: float) -> Array:
-    """Return a series (T, n) after a Gaussian filter over its frames.
-
-    Before the first and after the last frame, these are held. SciPy's `ndimage` has the
-    filter, too, but takes 0.1 s to import.
-
-    Args:
-        series: The series.
-        deviation: The filter's standard deviation in frames, more than 0.
-
-    """
-    reach = int(4.0 * deviation + 0.5)
-    weights = np.exp(-0.5 / deviation**2 * np.arange(-reach, reach + 1) ** 2)
-    weights /= weights.sum()
-    held = np.pad(series, ((reach, reach), (0, 0)), mode="edge")
-    count = len(series)
-    result = weights[reach] * series
-    # both frames at a distance have one weight
-    for apart in range(reach, 0, -1):
-        before = held[reach - apart :][:count]
-        after = held[reach + apart :][:count]
-        result += weights[reach + apart] * (before + after)
-    return np.asarray(result)
 
 
 def _moved(frame: Frame, pose: Array, place: Array, cost: float, areas: Areas) -> Frame:
