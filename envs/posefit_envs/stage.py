@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from functools import lru_cache
-from itertools import pairwise
 from typing import Any, NamedTuple, final
 
 import numpy as np
@@ -14,7 +13,7 @@ from posefit.geometry.skeleton import ANGLES, BONES, JOINTS
 from posefit.silhouette.cost import mean_over_views, mismatch
 from posefit.silhouette.drawn import count_poses, uncounted
 from posefit.silhouette.mask import pack
-from posefit.silhouette.sharing import LEAST_SHARE, work_through
+from posefit.silhouette.sharing import LEAST_SHARE, shares_of, work_through
 from posefit_envs.kernels import Scenes, align_scenes, draw_scenes, unpack_scenes
 from posefit_envs.world import (
     BODY,
@@ -276,8 +275,12 @@ class Stage:
 
         Each shows the body that was rasterised last in its row.
         """
-        pictures = self._backdrops.copy()
         shown = rows[self._has_body[rows]]
+        # most pictures are of a reset: then nothing is to be drawn
+        if len(shown) == 0:
+            observed = self._backdrops[rows]
+            return observed.view(np.uint8)
+        pictures = self._backdrops.copy()
         # to draw a body again is not an evaluation
         with uncounted():
             self._drawn(
@@ -378,9 +381,8 @@ class Stage:
                 pictures,
             )
 
-        shares = max(min(self.threads, len(rows), len(rows) * k // LEAST_SHARE), 1)
-        cuts = [len(rows) * share // shares for share in range(shares + 1)]
-        parts = [slice(start, stop) for start, stop in pairwise(cuts)]
+        shares = min(self.threads, len(rows) * k // LEAST_SHARE)
+        parts = shares_of(len(rows), shares)
         work_through(parts, self.threads, lambda _: (), draw)
         # no pixel is unknown here, so the areas alone give the cost
         costs = [mismatch(view) for view in areas.reshape(views, n * k, 3)]
