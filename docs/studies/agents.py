@@ -18,7 +18,7 @@ import click
 import gymnasium as gym
 import numpy as np
 
-from pose_network import teach
+from pose_network import Instances, teach
 from posefit import Problem, minimise
 from posefit.arrays import Array
 from posefit.cli.output import Command
@@ -45,11 +45,18 @@ LEVELS = {
 BUDGETS = (8, 40, 200, 800, 2440)  # evaluations of blind searches
 SEARCHES = ("sapso", "cma")
 # what learns nothing: the k-th proposal of the look-up is the truth of the training
-# instance whose silhouette is the k-th nearest
+# instance whose silhouette is the k-th most similar
 LOOK_UP = "look-up"
-CONSTANTS = ("uniform", "the truth, projected", LOOK_UP)
 LOOKED_UP = 10_000  # training instances
 LOOKED_UP_AT_ONCE = 500
+# the same among silhouettes that are drawn near the training people's poses, without
+# damage
+DRAWN_LOOK_UP = "look-up of drawn silhouettes"
+DRAWN_SILHOUETTES = 400_000
+DRAWN_OF_INSTANCE = 40
+LOOK_UPS = (LOOK_UP, DRAWN_LOOK_UP)
+CONSTANTS = ("uniform", "the truth, projected", *LOOK_UPS)
+COMPARED_AT_ONCE = 20  # pictures: more take a gigabyte
 # taught on the answers to training silhouettes, or to silhouettes that are drawn; see
 # pose_network.py
 CLONING = "cloning"
@@ -65,18 +72,17 @@ ROLLOUT = 16
 BATCH = 256
 EPOCHS = 6
 LEARNING_RATE = 1.5e-3
+CLIP = 0.2  # of the ratio of probabilities
 LOG_DEVIATION = -1.6
 SHOWN = (12, 16)  # height and width of small pictures, where nothing is corrected
 NETWORKS: dict[str, list[int]] = {"pi": [384, 128], "vf": [128]}  # hidden layers
 # gentler steps of a taught network, after its estimates of rewards are learned
-CONTINUED_TAUGHT_STEPS = 120_000
-CONTINUED_STEPS = 150_000
-CONTINUED_RATE = 1e-3
-CONTINUED_LOG_DEVIATION = -1.8
-# A network that was taught on walks finds every walk of the training people, and no
-# other. PPO shows it silhouettes that its prior cannot match: all motions, with the
-# prior of walks.
-CONTINUED_MOTION = "all"
+CONTINUED_TAUGHT_STEPS = 100_000
+CONTINUED_STEPS = 120_000
+# larger steps or deviations forget within seconds what was taught
+CONTINUED_RATE = 2e-4
+CONTINUED_CLIP = 0.1
+CONTINUED_LOG_DEVIATION = -2.7
 VALUE_STEPS = 8_192
 VALUE_PASSES = 10
 LEARNING = {
@@ -161,10 +167,12 @@ def row_of(training: Training, policies: str | None) -> dict[str, Any]:
             np.savez_compressed(Path(policies) / name, *layers_of(model))
     elif training.agent == LOOK_UP:
         policy = looked_up(training)
+    elif training.agent == DRAWN_LOOK_UP:
+        policy = looked_up_drawn(training)
     else:
         policy = constant(training)
     row["cpu_seconds"] = round(process_time() - start_time, 1)
-    several = learns or training.agent in ("uniform", LOOK_UP)
+    several = learns or training.agent in ("uniform", *LOOK_UPS)
     count = MAX_EVALUATIONS if several else 1
     proposals, costs = episodes(policy, training, count)
     row["costs"] = costs.min(axis=0).tolist()
@@ -197,18 +205,50 @@ def looked_up(training: Training) -> Policy:
         pictures, _ = env.reset(options={"instance": numbers})
         silhouettes.append(shrunk(pictures[..., ::2]))
         truths.append([problem.truth for problem in env.unwrapped.problems])
-    known = np.concatenate(silhouettes)
-    answers = np.concatenate(truths)
+    return nearest_policy(np.concatenate(silhouettes), np.concatenate(truths))
+
+
+def looked_up_drawn(training: Training) -> Policy:
+    """Return a policy that proposes the poses of the nearest drawn silhouettes."""
+    env = made(training, LOOKED_UP_AT_ONCE, max_evaluations=10**9)
+    instances = Instances(env, np.random.default_rng(training.seed))
+    silhouettes: list[Any] = []
+    poses: list[Array] = []
+    while len(poses) * LOOKED_UP_AT_ONCE < DRAWN_SILHOUETTES:
+        instances.change()
+        for _ in range(DRAWN_OF_INSTANCE):
+            poses.append(instances.near())
+            silhouettes.append(instances.draw(poses[-1]))
+    return nearest_policy(np.concatenate(silhouettes), np.concatenate(poses))
+
+
+def nearest_policy(known: Any, answers: Array) -> Policy:
+    """Return a policy that proposes the answers to the most similar silhouettes.
+
+    The most similar one comes first.
+
+    Args:
+        known: Silhouettes (m, p), shrunk.
+        answers: The proposal (m, d) for each.
+    """
+    squares = (known**2).sum(axis=1)
+    nearest: list[Any] = []
     asked = 0
 
     def policy(pictures: Any) -> Array:
         nonlocal asked
-        seen = shrunk(pictures[..., ::2])
-        squares = (seen**2).sum(axis=1)[:, None] - 2.0 * seen @ known.T
-        squares += (known**2).sum(axis=1)
-        nearest = np.argpartition(squares, asked, axis=1)[:, asked]
+        if not nearest:
+            seen = shrunk(pictures[..., ::2])
+            for first in range(0, len(seen), COMPARED_AT_ONCE):
+                some = seen[first : first + COMPARED_AT_ONCE]
+                distances = squares - 2.0 * some @ known.T
+                few = np.argpartition(distances, MAX_EVALUATIONS, axis=1)
+                few = few[:, :MAX_EVALUATIONS]
+                order = np.take_along_axis(distances, few, axis=1).argsort(axis=1)
+                nearest.extend(np.take_along_axis(few, order, axis=1))
+        proposals: Array = answers[np.array(nearest)[:, asked]]
         asked += 1
-        return answers[nearest]
+        return proposals
 
     return policy
 
@@ -241,7 +281,7 @@ def minimum(
     return minimise(searched, optimiser, budget_known=True)
 
 
-def ppo(vector: Any, seed: int, rate: float = LEARNING_RATE) -> Any:
+def ppo(vector: Any, seed: int, rate: float = LEARNING_RATE, clip: float = CLIP) -> Any:
     """Return the untrained learner of a vector environment for Stable-Baselines3."""
     import torch
     from stable_baselines3 import PPO
@@ -254,7 +294,7 @@ def ppo(vector: Any, seed: int, rate: float = LEARNING_RATE) -> Any:
     }
     return PPO(
         "MlpPolicy", vector, seed=seed, device="cpu", gamma=0.0,
-        learning_rate=lambda left: rate * left,
+        learning_rate=lambda left: rate * left, clip_range=clip,
         n_steps=ROLLOUT, batch_size=BATCH, n_epochs=EPOCHS,
         policy_kwargs=policy_settings,
     )  # fmt: skip
@@ -265,13 +305,11 @@ def trained(training: Training) -> Any:
     import torch
 
     continued = training.agent == CONTINUED
-    arguments: dict[str, Any] = {"errors": False}
+    env = Corrections(made(training, ENVIRONMENTS, errors=False))
     if continued:
-        prior = made(training, 1).unwrapped.world.training
-        arguments |= {"motion": CONTINUED_MOTION, "train": prior}
-    env = Corrections(made(training, ENVIRONMENTS, **arguments))
-    rate = CONTINUED_RATE if continued else LEARNING_RATE
-    model = ppo(to_sb3_vec_env(env), training.seed, rate)
+        model = ppo(to_sb3_vec_env(env), training.seed, CONTINUED_RATE, CONTINUED_CLIP)
+    else:
+        model = ppo(to_sb3_vec_env(env), training.seed)
     practised = {CLONING: 0, POSING: 0, CONTINUED: CONTINUED_STEPS}
     steps = practised.get(training.agent, training.budget)
     taught = training.budget - steps
@@ -363,10 +401,14 @@ def table(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
             continue
         ((budget, group),) = budgets.items()
         costs = np.array([row["costs"] for row in group])
-        proposals = "8" if agent in (*LEARNERS, "uniform", LOOK_UP) else "1"
+        proposals = "8" if agent in (*LEARNERS, "uniform", *LOOK_UPS) else "1"
         steps = f"{budget:,}"
         cpu = f"{np.mean([row['cpu_seconds'] for row in group]):.0f}"
-        training = [steps, cpu, str(len(group))] if agent in LEARNERS else ["", "", ""]
+        training = ["", "", ""]
+        if agent in LEARNERS:
+            training = [steps, cpu, str(len(group))]
+        elif agent in LOOK_UPS:
+            training = ["", cpu, ""]
         low, high = quantiles(drawn_means(costs))
         equal = [equivalent(blind[name], float(costs.mean())) for name in SEARCHES]
         cells.append(

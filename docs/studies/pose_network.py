@@ -102,13 +102,17 @@ class Instances:
             proposals[:, 0] = (proposals[:, 0] + 1.0) % 2.0 - 1.0
         return np.clip(proposals, -1.0, 1.0)
 
-    def lesson(self, share: float) -> Lesson:
-        """Return silhouettes, a share of them drawn, and their answers."""
+    def near(self) -> Array:
+        """Return a random proposal (n, d) near each true pose."""
         spread = np.full(self.dimensions, SPREAD)
         spread[1:3] *= TILTS
         deviations = spread * self.rng.standard_normal(self.truths.shape)
+        return self.boxed(self.truths + deviations)
+
+    def lesson(self, share: float) -> Lesson:
+        """Return silhouettes, a share of them drawn, and their answers."""
+        near = self.near()
         drawn = self.rng.random(len(self.truths)) < share
-        near = self.boxed(self.truths + deviations)
         answers = np.where(drawn[:, None], near, self.truths)
         observed = np.clip(self.draw(answers) + self.damage, 0.0, 1.0)
         return Lesson(np.where(drawn[:, None], observed, self.own), answers)
