@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, inlined, jit
-from posefit.geometry.kernels import place_frames
+from posefit.geometry.kernels import place_frames, sine_cosine
 from posefit.geometry.skeleton import ANGLES
 from posefit.silhouette.rasteriser import NEAR
 
@@ -47,10 +47,13 @@ CAP = 2  # points on one half of the arc at a bone's end
 # another bone
 COVERED = 0.25
 TINY = 1e-9
-# columns of a row of `cones`: centre and radius of the first disc; the offset from its
-# centre to the last disc's; how much less the last radius is; the length of the bone;
-# and the length of the cone's sides, 0 if one disc covers the other
-X0, Y0, R0, DX, DY, TAPER, LENGTH, SIDE = range(8)
+# Columns of a row of `cones`: centre and radius of the first disc; the direction to the
+# last disc's centre, and its distance; how much less the last radius is; the tangent of
+# the angle that the sides have with the axis; and 1 over the length of the bone, 0 if
+# one disc covers the other. They are what a distance needs: each cone gets many, and
+# divisions and roots take longest.
+X0, Y0, R0, AXIS_X, AXIS_Y, LENGTH, TAPER, TANGENT, INVERSE = range(9)
+CONE = 9  # columns
 # A bone has six numbers: the columns and rows of its first and its last disc, then both
 # radii. Row 0 has the indices of the first disc's column, row and radius.
 NUMBERS_OF_END = np.array([[0, 1, 4], [2, 3, 5]])
@@ -113,7 +116,7 @@ class Pulls(NamedTuple):
 class Bones(NamedTuple):
     """The drawn bones of one view."""
 
-    cones: Array  # (B, 8) with columns from X0 to SIDE
+    cones: Array  # (B, CONE) with columns from X0 to INVERSE
     discs: Array  # (B, 3) a disc around each bone: its centre and radius
     neighbours: NDArray[np.int64]  # (n,) bones that may hide a bone's border
 
@@ -145,7 +148,7 @@ class BoneSquares(NamedTuple):
 
 @jit
 def write_cones(parents, centres, radii, cones, discs):
-    """Write `cones` (B, 8), from which distances follow, and `discs` (B, 3).
+    """Write `cones` (B, CONE), from which distances follow, and `discs` (B, 3).
 
     A disc encloses its bone. Its three numbers are its centre and radius.
     """
@@ -159,18 +162,44 @@ def write_cones(parents, centres, radii, cones, discs):
         dr = r0 - r1
         square = dx * dx + dy * dy
         length = math.sqrt(square)
-        side = math.sqrt(square - dr * dr) if square > dr * dr + TINY else 0.0
         cones[b, X0] = x
         cones[b, Y0] = y
         cones[b, R0] = r0
-        cones[b, DX] = dx
-        cones[b, DY] = dy
-        cones[b, TAPER] = dr
+        cones[b, AXIS_X] = dx / max(length, TINY)
+        cones[b, AXIS_Y] = dy / max(length, TINY)
         cones[b, LENGTH] = length
-        cones[b, SIDE] = side
+        cones[b, TAPER] = dr
+        cones[b, TANGENT] = 0.0
+        cones[b, INVERSE] = 0.0
+        if square > dr * dr + TINY:
+            cones[b, TANGENT] = dr / math.sqrt(square - dr * dr)
+            cones[b, INVERSE] = 1.0 / length
         discs[b, 0] = x + 0.5 * dx
         discs[b, 1] = y + 0.5 * dy
         discs[b, 2] = 0.5 * length + max(r0, r1)
+
+
+@inlined
+def _nearest_disc(x, y, cone):
+    """Return the disc of a cone that is nearest to a point.
+
+    Returns:
+        Its share of the bone, the offset (2,) of the point from its centre, and its
+        radius.
+
+    """
+    x -= cone[X0]
+    y -= cone[Y0]
+    axis_x = cone[AXIS_X]
+    axis_y = cone[AXIS_Y]
+    along = x * axis_x + y * axis_y
+    across = abs(y * axis_x - x * axis_y)
+    share = (along - across * cone[TANGENT]) * cone[INVERSE]
+    if cone[INVERSE] == 0.0 and cone[TAPER] < 0.0:
+        share = 1.0
+    share = min(max(share, 0.0), 1.0)
+    part = share * cone[LENGTH]
+    return share, x - part * axis_x, y - part * axis_y, cone[R0] - share * cone[TAPER]
 
 
 @inlined
@@ -179,25 +208,18 @@ def cone_distance(x, y, cone):
 
     The distance is negative within the cone.
     """
-    x0 = cone[X0]
-    y0 = cone[Y0]
-    r0 = cone[R0]
-    dx = cone[DX]
-    dy = cone[DY]
-    dr = cone[TAPER]
-    length = cone[LENGTH]
-    side = cone[SIDE]
-    if side == 0.0:
-        share = 0.0 if dr >= 0.0 else 1.0
-    else:
-        along = ((x - x0) * dx + (y - y0) * dy) / length
-        across = abs((y - y0) * dx - (x - x0) * dy) / length
-        share = min(max((along - across * dr / side) / length, 0.0), 1.0)
-    ox = x - (x0 + share * dx)
-    oy = y - (y0 + share * dy)
+    share, ox, oy, radius = _nearest_disc(x, y, cone)
     off = math.sqrt(ox * ox + oy * oy)
-    distance = off - (r0 - share * dr)  # contour (1)
+    distance = off - radius  # contour (1)
     return distance, share, ox / max(off, TINY), oy / max(off, TINY)
+
+
+@inlined
+def _nearer(x, y, cone, distance):
+    """Return whether a point is nearer to a cone than a distance, without a root."""
+    _, ox, oy, radius = _nearest_disc(x, y, cone)
+    reach = radius + distance
+    return reach > 0.0 and ox * ox + oy * oy < reach * reach
 
 
 @inlined
@@ -255,11 +277,10 @@ def _nearest_bone(x, y, first, cones, discs):
         reach = least + discs[b, 2]
         dx = x - discs[b, 0]
         dy = y - discs[b, 1]
-        if b != first and dx * dx + dy * dy < reach * reach:
-            off = cone_distance(x, y, cones[b])[0]
-            if off < least:
-                least = off
-                bone = b
+        near = b != first and dx * dx + dy * dy < reach * reach
+        if near and _nearer(x, y, cones[b], least):
+            least = cone_distance(x, y, cones[b])[0]
+            bone = b
     return bone
 
 
@@ -292,7 +313,7 @@ def visible(x, y, bones):
         dx = x - discs[b, 0]
         dy = y - discs[b, 1]
         near = dx * dx + dy * dy < discs[b, 2] * discs[b, 2]
-        if near and cone_distance(x, y, cones[b])[0] < -COVERED:
+        if near and _nearer(x, y, cones[b], -COVERED):
             neighbours[i] = neighbours[0]
             neighbours[0] = b
             shown = False
@@ -310,7 +331,7 @@ def accumulate_borders(parents, centres, radii, contour, scale, hessians, gradie
     nearest now.
     """
     count = parents.size
-    cones = np.empty((count, 8))
+    cones = np.empty((count, CONE))
     discs = np.empty((count, 3))
     write_cones(parents, centres, radii, cones, discs)
     products = np.zeros((count, PRODUCTS))
@@ -374,8 +395,8 @@ def side_points(cone, contour, scale, bones, products):
     The sides are the segments that touch both discs.
     """
     length = cone[LENGTH]
-    dx = cone[DX] / length
-    dy = cone[DY] / length
+    dx = cone[AXIS_X]
+    dy = cone[AXIS_Y]
     cosine = cone[TAPER] / length
     sine = math.sqrt(1.0 - cosine * cosine)
     pieces = max(int(length / (2.0 * contour.step)) + 1, 2)
@@ -384,8 +405,8 @@ def side_points(cone, contour, scale, bones, products):
         # the first and the last point have only one neighbour: half a piece each
         piece = length * sine / pieces * (0.5 if i in (0, pieces) else 1.0)
         radius = cone[R0] - share * cone[TAPER]
-        u = cone[X0] + share * cone[DX]
-        v = cone[Y0] + share * cone[DY]
+        u = cone[X0] + share * length * dx
+        v = cone[Y0] + share * length * dy
         disc = share, u, v, radius
         for across in (sine, -sine):
             normal = cosine * dx - across * dy, cosine * dy + across * dx
@@ -396,22 +417,21 @@ def side_points(cone, contour, scale, bones, products):
 def cap_points(cone, contour, scale, bones, products):
     """Add the squared distances of points on the two arcs of a bone's border."""
     length = cone[LENGTH]
-    dx = cone[DX] / length
-    dy = cone[DY] / length
+    dx = cone[AXIS_X]
+    dy = cone[AXIS_Y]
     # the angle from the axis to the normal of the cone's side
     tilt = math.acos(cone[TAPER] / length)
     # the arc of the last disc is around the axis, the arc of the first around its
     # opposite
     for share, start, arc in ((1.0, 0.0, tilt), (0.0, tilt, math.pi - tilt)):
         radius = cone[R0] - share * cone[TAPER]
-        u = cone[X0] + share * cone[DX]
-        v = cone[Y0] + share * cone[DY]
+        u = cone[X0] + share * length * dx
+        v = cone[Y0] + share * length * dy
         disc = share, u, v, radius
         piece = radius * arc / CAP
         for i in range(CAP):
             angle = start + arc * ((i + 0.5) / CAP)
-            along = math.cos(angle)
-            sine = math.sin(angle)
+            sine, along = sine_cosine(angle)
             for across in (sine, -sine):
                 normal = along * dx - across * dy, along * dy + across * dx
                 _accumulate_point(disc, normal, piece, contour, scale, bones, products)

@@ -100,7 +100,7 @@ def cone_distance(
     x: float, y: float, points: Array, radii: Array
 ) -> tuple[float, float, float, float]:
     """Return how far a point is outside the cone of two discs, at which share of it, and its normal."""
-    cones = np.empty((1, 8))
+    cones = np.empty((1, kernels.CONE))
     discs = np.empty((1, 3))
     kernels.write_cones(
         np.zeros(1, int), np.asarray(points), np.asarray(radii)[None], cones, discs
