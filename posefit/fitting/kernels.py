@@ -5,7 +5,7 @@ The functions take plain arrays and rely on the callers for their shapes.
 
 import numpy as np
 
-from posefit.arrays import jit
+from posefit.arrays import inlined, jit
 
 # The outermost joint depends a little on the place of the body, so the system is solved
 # several times.
@@ -13,6 +13,87 @@ ROUNDS = 3
 DAMPING = 1e-9  # keeps the 3 x 3 system solvable if a silhouette has too few borders
 # Metres. A joint nearer than this, or behind the camera, counts as this far away.
 NEAREST = 1e-3
+
+
+@inlined
+def _write_directions(rotations, focals, centres, borders, directions, inverse):
+    """Write r (views, 4, 3) of each known border, and the inverse (3, 3) of A.
+
+    All poses share them, see `move_to_borders`.
+    """
+    xx = yy = zz = DAMPING
+    xy = xz = yz = 0.0
+    for v in range(borders.shape[0]):
+        R = rotations[v]
+        scale = np.sqrt(focals[v, 0] * focals[v, 1])
+        for side in range(4):
+            if np.isnan(borders[v, side]):
+                continue
+            axis = side % 2
+            f = focals[v, axis]
+            b = borders[v, side] - centres[v, axis]
+            x = (f * R[axis, 0] - b * R[2, 0]) / scale
+            y = (f * R[axis, 1] - b * R[2, 1]) / scale
+            z = (f * R[axis, 2] - b * R[2, 2]) / scale
+            xx += x * x
+            xy += x * y
+            xz += x * z
+            yy += y * y
+            yz += y * z
+            zz += z * z
+            directions[v, side, 0] = x
+            directions[v, side, 1] = y
+            directions[v, side, 2] = z
+    # by cofactors, of a symmetric matrix
+    inverse[0, 0] = yy * zz - yz * yz
+    inverse[0, 1] = inverse[1, 0] = xz * yz - xy * zz
+    inverse[0, 2] = inverse[2, 0] = xy * yz - xz * yy
+    inverse[1, 1] = xx * zz - xz * xz
+    inverse[1, 2] = inverse[2, 1] = xy * xz - xx * yz
+    inverse[2, 2] = xx * yy - xy * xy
+    inverse /= xx * inverse[0, 0] + xy * inverse[0, 1] + xz * inverse[0, 2]
+
+
+@inlined
+def _find_outermost(focal, scale, radii, relative, root, discs, outermost):
+    """Write which joints (4,) are outermost in a picture: left, top, right, bottom.
+
+    Args:
+        focal: (2,) focal lengths, pixels.
+        scale: Their geometric mean.
+        radii: (27,) metres.
+        relative: (3, 27) metres, the joints from the root, in the camera's axes.
+        root: The place of the root, in the camera's axes.
+        discs: A buffer (3, 27).
+        outermost: The array to write.
+
+    """
+    x, y, z = root
+    for j in range(radii.size):
+        depth = 1.0 / max(relative[2, j] + z, NEAREST)
+        discs[0, j] = focal[0] * (relative[0, j] + x) * depth
+        discs[1, j] = focal[1] * (relative[1, j] + y) * depth
+        discs[2, j] = scale * radii[j] * depth
+    left = top = right = bottom = -np.inf
+    first = second = third = last = 0
+    # Choices of values instead of branches: a processor cannot guess which joint is
+    # outermost, and each wrong guess costs as much as five joints.
+    for j in range(radii.size):
+        across = discs[0, j]
+        down = discs[1, j]
+        wide = discs[2, j]
+        first = j if wide - across > left else first
+        left = wide - across if wide - across > left else left
+        second = j if wide - down > top else second
+        top = wide - down if wide - down > top else top
+        third = j if wide + across > right else third
+        right = wide + across if wide + across > right else right
+        last = j if wide + down > bottom else last
+        bottom = wide + down if wide + down > bottom else bottom
+    outermost[0] = first
+    outermost[1] = second
+    outermost[2] = third
+    outermost[3] = last
 
 
 @jit
@@ -28,22 +109,23 @@ def move_to_borders(
     """
     views = borders.shape[0]
     count = joints.shape[1]
-    relative = np.empty((views, count, 3))  # joints in the camera's axes, from the root
-    reach = np.empty(4)
+    relative = np.empty((views, 3, count))  # joints in the camera's axes, from the root
+    discs = np.empty((3, count))
     outermost = np.empty(4, np.int64)
+    directions = np.empty((views, 4, 3))
+    inverse = np.empty((3, 3))
+    _write_directions(rotations, focals, centres, borders, directions, inverse)
     for i in range(joints.shape[0]):
         for v in range(views):
             for j in range(count):
                 for a in range(3):
-                    relative[v, j, a] = (
+                    relative[v, a, j] = (
                         rotations[v, a, 0] * joints[i, j, 0]
                         + rotations[v, a, 1] * joints[i, j, 1]
                         + rotations[v, a, 2] * joints[i, j, 2]
                     )
         t = translations[i]
         for _ in range(ROUNDS):
-            xx = yy = zz = DAMPING
-            xy = xz = yz = 0.0
             bx = DAMPING * t[0]
             by = DAMPING * t[1]
             bz = DAMPING * t[2]
@@ -51,21 +133,14 @@ def move_to_borders(
                 R = rotations[v]
                 o = offsets[v]
                 scale = np.sqrt(focals[v, 0] * focals[v, 1])
-                x = R[0, 0] * t[0] + R[0, 1] * t[1] + R[0, 2] * t[2] + o[0]
-                y = R[1, 0] * t[0] + R[1, 1] * t[1] + R[1, 2] * t[2] + o[1]
-                z = R[2, 0] * t[0] + R[2, 1] * t[1] + R[2, 2] * t[2] + o[2]
-                reach[:] = -np.inf
-                outermost[:] = 0
-                for j in range(count):
-                    depth = 1.0 / max(relative[v, j, 2] + z, NEAREST)
-                    across = focals[v, 0] * (relative[v, j, 0] + x) * depth
-                    down = focals[v, 1] * (relative[v, j, 1] + y) * depth
-                    wide = scale * radii[j] * depth
-                    for side, value in enumerate(
-                        (wide - across, wide - down, wide + across, wide + down)
-                    ):
-                        if value > reach[side]:
-                            reach[side], outermost[side] = value, j
+                root = (
+                    R[0, 0] * t[0] + R[0, 1] * t[1] + R[0, 2] * t[2] + o[0],
+                    R[1, 0] * t[0] + R[1, 1] * t[1] + R[1, 2] * t[2] + o[1],
+                    R[2, 0] * t[0] + R[2, 1] * t[1] + R[2, 2] * t[2] + o[2],
+                )
+                _find_outermost(
+                    focals[v], scale, radii, relative[v], root, discs, outermost
+                )
                 for side in range(4):
                     if np.isnan(borders[v, side]):
                         continue
@@ -74,35 +149,17 @@ def move_to_borders(
                     j = outermost[side]
                     f = focals[v, axis]
                     b = borders[v, side] - centres[v, axis]
-                    rx = (f * R[axis, 0] - b * R[2, 0]) / scale
-                    ry = (f * R[axis, 1] - b * R[2, 1]) / scale
-                    rz = (f * R[axis, 2] - b * R[2, 2]) / scale
                     gap = (
-                        b * (relative[v, j, 2] + o[2])
-                        - f * (relative[v, j, axis] + o[axis])
+                        b * (relative[v, 2, j] + o[2])
+                        - f * (relative[v, axis, j] + o[axis])
                         - sign * scale * radii[j]
                     )
                     gap /= scale
-                    xx += rx * rx
-                    xy += rx * ry
-                    xz += rx * rz
-                    yy += ry * ry
-                    yz += ry * rz
-                    zz += rz * rz
-                    bx += gap * rx
-                    by += gap * ry
-                    bz += gap * rz
-            # the inverse of a symmetric 3 x 3 matrix, by cofactors
-            cx = yy * zz - yz * yz
-            cy = xz * yz - xy * zz
-            cz = xy * yz - xz * yy
-            determinant = xx * cx + xy * cy + xz * cz
-            dy = xx * zz - xz * xz
-            dz = xy * xz - xx * yz
-            ez = xx * yy - xy * xy
-            t[0] = (cx * bx + cy * by + cz * bz) / determinant
-            t[1] = (cy * bx + dy * by + dz * bz) / determinant
-            t[2] = (cz * bx + dz * by + ez * bz) / determinant
+                    bx += gap * directions[v, side, 0]
+                    by += gap * directions[v, side, 1]
+                    bz += gap * directions[v, side, 2]
+            for a in range(3):
+                t[a] = inverse[a, 0] * bx + inverse[a, 1] * by + inverse[a, 2] * bz
 
 
 @jit
