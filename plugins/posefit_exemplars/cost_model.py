@@ -74,11 +74,11 @@ FITTED_COST_SHARE = 0.4  # estimate of the cost after a fit, before the first on
 
 
 def squared_distances(codes: Codes, others: Codes) -> Codes:
-    """Return the squared distances (n, m) of codes."""
+    """Return the squared distances (..., n, m) of codes (..., n, D) and (..., m, D)."""
     squares = (
-        (codes**2).sum(axis=1)[:, None]
-        - 2.0 * (codes @ others.T)
-        + (others**2).sum(axis=1)
+        (codes**2).sum(axis=-1)[..., None]
+        - 2.0 * (codes @ others.swapaxes(-1, -2))
+        + (others**2).sum(axis=-1)[..., None, :]
     )
     return np.asarray(np.maximum(squares, 0.0))
 
@@ -352,22 +352,23 @@ def motion_step_costs(spread: float, before: Hypotheses, after: Hypotheses) -> A
     """
     scale = 0.5 / (spread**2 * len(JOINTS))
     total = np.zeros((len(before.joints), len(after.joints)))
+    # (speeds, 1, 1) each, so that NumPy compares all speeds at once
+    speeds = np.array([*SPEED_COSTS])[:, None, None]
+    halves = (0.5 * speeds).astype(np.float32)
+    squares = (speeds**2).astype(np.float32)
+    prices = np.array([*SPEED_COSTS.values()], np.float32)[:, None, None]
     for part in PARTS:
         joints = _flat(before.joints[:, part])
         rates = _flat(before.rates[:, part])
         later = _flat(after.joints[:, part])
         later_rates = _flat(after.rates[:, part])
         changes = squared_distances(rates, later_rates)
-        cheapest = np.full(total.shape, np.inf)
-        for speed, cost in SPEED_COSTS.items():
-            # half a frame after the one and half a frame before the other
-            half = np.float32(0.5 * speed)
-            missed = squared_distances(
-                joints + half * rates, later - half * later_rates
-            )
-            costs = scale * (missed + speed**2 * changes) + cost
-            np.minimum(cheapest, costs, out=cheapest)
-        total += cheapest
+        # half a frame after the one and half a frame before the other
+        missed = squared_distances(
+            joints + halves * rates, later - halves * later_rates
+        )
+        costs = scale * (missed + squares * changes) + prices  # (speeds, n, m)
+        total += costs.min(axis=0)
     return total
 
 

@@ -239,9 +239,10 @@ class Lookup:
         if yaw is not None:
             distances[:, np.abs(wrapped(yaws - yaw)) > YAW_TOLERANCE] = np.inf
         # of two neighbouring yaws only the better one is returned
-        neighbours = distances.reshape(len(distances), -1, 2)
-        better = neighbours.argmin(axis=2)
-        flat = neighbours.min(axis=2).ravel()
+        first = distances[:, ::2]
+        second = distances[:, 1::2]
+        better = second < first
+        flat = np.where(better, second, first).ravel()
         count = min(count, len(flat))
         rows = np.argpartition(flat, count - 1)[:count]
         rows = rows[np.argsort(flat[rows], kind="stable")]

@@ -150,18 +150,22 @@ class ClipPath:
         """
         full, small = self._counts(frame_costs, latest is None)
         if latest is None:
-            proposed, used = self._proposals.first(frame_costs, small, rng)
-            beam, costs, evaluations = self._best(frame_costs, proposed, full, used)
+            proposed, poses, used = self._proposals.first(frame_costs, small, rng)
+            beam, costs, evaluations = self._best(
+                frame_costs, proposed, poses, full, used
+            )
             paths = markov.likeliest_paths(costs)
             return _PathFrame(
                 replace(beam, totals=paths.totals), paths, frame_costs, evaluations
             )
         steps = ClipSteps.of(self.exemplars, latest.beam, self._step)
         if frame_costs.usable:
-            proposed, used = self._proposals.next(
+            proposed, poses, used = self._proposals.next(
                 frame_costs, steps, small, everywhere, rng
             )
-            beam, costs, evaluations = self._best(frame_costs, proposed, full, used)
+            beam, costs, evaluations = self._best(
+                frame_costs, proposed, poses, full, used
+            )
         else:
             # nothing is seen: clips continue, and all states cost the same
             beam = next_states(self.exemplars, steps, BEAM_STATES)
@@ -180,7 +184,7 @@ class ClipPath:
         )
 
     def _best(
-        self, frame_costs: FrameCosts, beam: Beam, full: int, used: int
+        self, frame_costs: FrameCosts, beam: Beam, poses: Array, full: int, used: int
     ) -> tuple[Beam, Array, float]:
         """Return the best of the proposed states.
 
@@ -190,6 +194,7 @@ class ClipPath:
         Args:
             frame_costs: The costs of the frame.
             beam: The proposed states.
+            poses: (n, 66) their poses.
             full: How many of them get costs at full size.
             used: Costs in the small picture that were computed before.
 
@@ -197,7 +202,6 @@ class ClipPath:
             The states, their costs (n,), and the evaluations used.
 
         """
-        poses = poses_of(self.exemplars, beam)
         rough = self._costs.of_small(frame_costs, poses, beam.places)
         used += len(beam)
         rows = diverse_best(self.exemplars, beam, beam.totals + rough, full)

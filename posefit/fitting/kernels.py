@@ -75,25 +75,25 @@ def _find_outermost(focal, scale, radii, relative, root, discs, outermost):
         discs[1, j] = focal[1] * (relative[1, j] + y) * depth
         discs[2, j] = scale * radii[j] * depth
     left = top = right = bottom = -np.inf
-    first = second = third = last = 0
-    # Choices of values instead of branches: a processor cannot guess which joint is
-    # outermost, and each wrong guess costs as much as five joints.
+    leftmost = topmost = rightmost = lowest = 0
+    # Values are chosen without branches: a processor guesses wrong which joint comes
+    # next, and that took longer than all the rest of the comparison.
     for j in range(radii.size):
         across = discs[0, j]
         down = discs[1, j]
         wide = discs[2, j]
-        first = j if wide - across > left else first
+        leftmost = j if wide - across > left else leftmost
         left = wide - across if wide - across > left else left
-        second = j if wide - down > top else second
+        topmost = j if wide - down > top else topmost
         top = wide - down if wide - down > top else top
-        third = j if wide + across > right else third
+        rightmost = j if wide + across > right else rightmost
         right = wide + across if wide + across > right else right
-        last = j if wide + down > bottom else last
+        lowest = j if wide + down > bottom else lowest
         bottom = wide + down if wide + down > bottom else bottom
-    outermost[0] = first
-    outermost[1] = second
-    outermost[2] = third
-    outermost[3] = last
+    outermost[0] = leftmost
+    outermost[1] = topmost
+    outermost[2] = rightmost
+    outermost[3] = lowest
 
 
 @jit
