@@ -1,8 +1,11 @@
 """Errors of clinical angles in recorded walks of people who are not in the library.
 
+    python docs/studies/angles.py
+
 Hip and knee flexion and ankle dorsiflexion of both sides are compared with the truth.
-There are two errors: the root mean square, and the same after the mean difference is
-removed. composites.py has the same for composed videos.
+The table has a line for each set of views: medians over the walks, in degrees, of the
+root mean square error, and of the same after the mean difference is removed
+("varies"). composites.py has the same for composed videos.
 """
 
 from collections.abc import Iterator, Mapping

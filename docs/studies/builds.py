@@ -1,7 +1,11 @@
 """How accurately a person's build is estimated.
 
+    python docs/studies/builds.py
+
 The subjects are synthetic: bones and radii are each up to 10 % off the average, and the
-stature is up to 10 % taller or smaller. A sweep's cell tracks a person with known
+stature is up to 10 % taller or smaller. It prints the errors of stature and limbs in
+percent, mean and largest, for one, two and four views: of the fitted build, and of the
+average build from which the fit starts. A sweep's cell tracks a person with known
 build, so these runs are jobs.
 """
 

@@ -1,4 +1,8 @@
-"""Recorded clips of people outside the library, and their tracks, for all studies."""
+"""Recorded clips of people outside the library, and their tracks, for all studies.
+
+Other studies import this module; it prints nothing. `GROUPS` has the clips by kind of
+motion, and `track_of` tracks one with a library that lacks its person.
+"""
 
 from collections.abc import Mapping
 from functools import lru_cache

@@ -1,4 +1,14 @@
-"""Composed videos with a known truth, tracked like any footage."""
+"""Composed videos with a known truth, tracked like any footage.
+
+    python docs/studies/composites.py VIDEO --rows rows.jsonl
+    python docs/studies/composites.py VIDEO --situation through --seeds 1
+
+VIDEO is the demonstration video of Sports2D; composites_scene.py puts recorded people
+in front of its background, in ten situations. The table has a line for each track: its
+error, lost frames, exchanged sides, frames that the tracker flags as unknown or that it
+should have flagged, frames on another person, errors of clinical angles, and the grade
+of the tracker's own audit. Tracks that were refused follow, with the reason.
+"""
 
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence

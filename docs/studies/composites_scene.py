@@ -1,4 +1,8 @@
-"""Videos with a known truth: recorded people, composed into real empty pictures."""
+"""Videos with a known truth: recorded people, composed into real empty pictures.
+
+composites.py imports this module; it prints nothing. A scene has the videos, the true
+motions and masks, and cameras whose calibration is slightly wrong.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -1,5 +1,7 @@
 """Legs of published shapes, and a painter of bodies that is not the tracker's.
 
+bodies.py and knees.py import this module; it prints nothing.
+
 The tracker's thigh and shank are one cone each, whose ends have a fixed ratio of radii.
 People's are not. Here a leg is a chain of discs whose girths are measured ones: those
 of ANSUR II (Gordon et al. 2014, NATICK/TR-15/007; ANSUR_II_MALE_Public.csv and

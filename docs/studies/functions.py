@@ -1,12 +1,19 @@
 """Features and slices of the suite's functions, and which methods reach which targets.
 
-The features are compared with bbob's. They use only costs in the box [-1, 1]^d. Random
-points are drawn like a first population: feasible, and around the start if there is
-one. The optimum is the lowest known cost: the suite's, or that of a descent. A descent
-is a CMA-ES from a random point, without restarts. A point is near the optimum if it
-costs at most the *level*. The level is the median cost of points that are `NEAR`
-half-sides per coordinate off the optimum, so that the scale of costs does not matter.
-Noise is included except in `conditioning`, and in deciding where a descent has ended.
+    python docs/studies/functions.py --picture functions.jpg
+
+It prints two tables. The first has the features of each function, and of bbob's for
+comparison. The second has the share of targets that each method reaches after each
+budget, in percent, and which method leads. The picture shows a slice through each
+function.
+
+The features use only costs in the box [-1, 1]^d. Random points are sampled like a first
+population: feasible, and around the start if there is one. The optimum is the lowest
+known cost: the suite's, or that of a descent. A descent is a CMA-ES from a random
+point, without restarts. A point is near the optimum if it costs at most the *level*.
+The level is the median cost of points that are `NEAR` half-sides per coordinate off the
+optimum, so that the scale of costs does not matter. Noise is included except in
+`conditioning`, and in deciding where a descent has ended.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence

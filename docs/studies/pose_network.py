@@ -1,8 +1,11 @@
 """Teaches a network to correct proposals in FitImage, on silhouettes that it draws.
 
+agents.py and make_agent.py import this module; it prints nothing. agents.py measures
+what is learned.
+
 The environment draws any proposal. So a proposal near a training person's pose gives a
-silhouette of which the answer is known, and any other proposal is something to correct.
-`agents.py` measures what is learned.
+silhouette of which the answer is known, and any other proposal is something to
+correct.
 """
 
 from typing import Any, NamedTuple

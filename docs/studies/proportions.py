@@ -1,8 +1,12 @@
 """How much people's proportions vary: the numbers of a build's prior.
 
+    python docs/studies/proportions.py MEN WOMEN
+
 MEN and WOMEN are the public tables of ANSUR II, ANSUR_II_MALE_Public.csv and
 ANSUR_II_FEMALE_Public.csv, from https://www.openlab.psu.edu/ansur2 (Gordon et al. 2014,
-NATICK/TR-15/007).
+NATICK/TR-15/007). It prints the standard deviations of the logarithms of stature and of
+lengths relative to stature, and the correlations of these lengths, for a population
+with as many men as women.
 """
 
 import csv

@@ -1,8 +1,12 @@
 """Are observations worth it in Race-v1? Policies without, with, and with learning.
 
+    python docs/studies/race.py --rows race.jsonl
+
 They are tested on held-out instances. All have the same instances, first populations
 and budgets, so that they are compared in pairs. The figure is ln(1 + best cost), to
-which the rewards of an episode sum up.
+which the rewards of an episode sum up. The table has a line for each policy: trained
+steps, seeds, the mean of the figure, and by how much it is below that of round robin,
+with a 95 % interval over seeds and instances.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

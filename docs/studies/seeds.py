@@ -1,7 +1,11 @@
 """How much a track of the same film depends on the seed.
 
+    python docs/studies/seeds.py FILM --frames 55:166 --seeds 8
+
 FILM is the demonstration video of Sports2D, or any other. Frames, height and segmenter
-are chosen as for `posefit track`.
+are chosen as for `posefit track`. The table has a line for each seed: lost and unknown
+frames, the IoU, the verdict, and lengths of limbs. The last line is the median distance
+of the same joint in two tracks.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

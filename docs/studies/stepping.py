@@ -1,8 +1,11 @@
 """Steps of FitImage-v1 per second: the native vector, Gymnasium's Sync and Async.
 
-Episodes have eight steps, and the time includes their resets. All training instances
-were met before. The kinds take turns, and the best turn counts. Seconds are CPU
-seconds, summed over processes, so that other programs do not count.
+    python docs/studies/stepping.py
+
+The table has a line for each number of environments. Episodes have eight steps, and the
+time includes their resets. All training instances were met before. The kinds take
+turns, and the best turn counts. Seconds are CPU seconds, summed over processes, so that
+other programs do not count.
 """
 
 from collections.abc import Iterator
