@@ -230,9 +230,10 @@ def optuna(
     while True:
         with _quiet_optuna():
             trials = [study.ask(box) for _ in range(population_size)]
-        costs = yield np.array(
-            [[trial.params[name] for name in box] for trial in trials]
-        )
+        proposals = []
+        for trial in trials:
+            proposals.append([trial.params[name] for name in box])
+        costs = yield np.array(proposals)
         with _quiet_optuna():
             for trial, cost in zip(trials, costs.tolist(), strict=True):
                 study.tell(trial, cost)

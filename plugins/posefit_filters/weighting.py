@@ -36,20 +36,24 @@ def sharpness(costs: Array, wanted: float) -> float:
             return high
     above = survival(costs, low) - wanted
     below = survival(costs, high) - wanted
-    side = 0
+    side = 0  # which end the last step moved: 1 the low one, -1 the high one
     beta = high
-    for _ in range(MAX_STEPS):  # false position, by the Illinois rule
+    # False position, by the Illinois rule: if the same end moves twice, the value at
+    # the other end is halved. Otherwise a curved function would hold it for ever.
+    for _ in range(MAX_STEPS):
         beta = (low * below - high * above) / (below - above)  # DEUTSCHER2005 (beta)
         if abs(rest := survival(costs, beta) - wanted) < TOLERANCE:
             break
         if rest > 0.0:
             low = beta
             above = rest
-            below = below * (0.5 if side > 0 else 1.0)
+            if side > 0:
+                below = 0.5 * below
             side = 1
         else:
             high = beta
             below = rest
-            above = above * (0.5 if side < 0 else 1.0)
+            if side < 0:
+                above = 0.5 * above
             side = -1
     return beta

@@ -74,7 +74,8 @@ class HPSO:
         self._stage = -1
         self._waiting = 0
         self._x = first_population(space, rng, evaluations)
-        # every stage gets the same share of what the first poses leave of the budget
+        # the first poses use a part of the budget; each stage gets an equal share of
+        # the rest
         self._generations = max(
             (evaluations - len(self._x)) // (self._size * len(self._runs)), 1
         )

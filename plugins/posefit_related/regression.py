@@ -176,9 +176,11 @@ class Regression:
             return latest[-1] + DAMPING * (latest[-1] - latest[0]), len(self.mean)
         yaw = self.task.yaw
         angles = self.task.first_pose
-        pose = np.concatenate(
-            [[yaw or 0.0, 0.0, 0.0], np.zeros(63) if angles is None else angles]
-        )
+        pose = np.zeros(66)
+        if yaw is not None:
+            pose[0] = yaw
+        if angles is not None:
+            pose[3:] = angles
         known = len(self.mean)
         if yaw is None:
             known = 0
