@@ -103,7 +103,7 @@ class Views(NamedTuple):
 
 
 class Pulls(NamedTuple):
-    """What is known of n places and poses before a fit.
+    """Prior knowledge about n places and poses: a mean and a precision per number.
 
     A place and a pose have 69 numbers, of which m may change.
     """
@@ -479,25 +479,10 @@ def _project_joints(camera, frames, centres, scales, moves):
         x = frames[j, 3, 0]
         y = frames[j, 3, 1]
         z = frames[j, 3, 2]
-        a = (
-            rotation[0, 0] * x
-            + rotation[0, 1] * y
-            + rotation[0, 2] * z
-            + translation[0]
-        )
-        b = (
-            rotation[1, 0] * x
-            + rotation[1, 1] * y
-            + rotation[1, 2] * z
-            + translation[1]
-        )
-        c = max(
-            rotation[2, 0] * x
-            + rotation[2, 1] * y
-            + rotation[2, 2] * z
-            + translation[2],
-            NEAR,
-        )
+        a = _camera_coordinate(0, rotation, translation, x, y, z)
+        b = _camera_coordinate(1, rotation, translation, x, y, z)
+        # joints behind the camera count as right in front of it
+        c = max(_camera_coordinate(2, rotation, translation, x, y, z), NEAR)
         centres[j, 0] = a / c * focal[0] + centre[0]
         centres[j, 1] = b / c * focal[1] + centre[1]
         scales[j] = math.sqrt(focal[0] * focal[1]) / c
@@ -505,6 +490,12 @@ def _project_joints(camera, frames, centres, scales, moves):
             moves[j, 0, i] = focal[0] / c * (rotation[0, i] - a / c * rotation[2, i])
             moves[j, 1, i] = focal[1] / c * (rotation[1, i] - b / c * rotation[2, i])
             moves[j, 2, i] = -scales[j] / c * rotation[2, i]
+
+
+@inlined
+def _camera_coordinate(i, rotation, translation, x, y, z):
+    """Return the i-th coordinate of a point in the camera's frame, in metres."""
+    return rotation[i, 0] * x + rotation[i, 1] * y + rotation[i, 2] * z + translation[i]
 
 
 @inlined
@@ -593,12 +584,24 @@ def add_view(parents, radii, camera, frames, contour, reach, grown, sums):
 
 @jit
 def _add_growth(b, parent, rows, scales, drawn, worth, grown, forces):
-    """Add bone b's normal equations by factors of the build. contour (14).
+    """Add bone b's normal equations by F factors of the build. contour (14).
 
-    See `add_view`.
+    Column 0 is for the residuals, and column 1 + f for factor f: with the gradient
+    as its product, the same sums give gradients and second derivatives.
+
+    Args:
+        b: the bone.
+        parent: the joint where it starts.
+        rows: derivatives (6, 6) of the bone's numbers by a twist, from (8).
+        scales: the pixels of a metre at each joint.
+        drawn: the Hessian and the gradient by the bone's numbers, from (5).
+        worth: the weight of the view's residuals, from (6).
+        grown: the derivatives by the factors; its `squares` are added to.
+        forces: the spatial forces (6, 1 + F) of the bone, which are added to.
     """
     block, gradient = drawn
     factors = len(grown.joints)
+    # derivatives of the bone's numbers by each factor, and `block` times these
     changes = np.zeros((6, 1 + factors))
     changed = np.zeros((6, 1 + factors))
     for end in range(2):
@@ -694,14 +697,7 @@ def composite_hessian(chain, screws, hessians, forces, matrix, gradients):
         gradients: the gradient and its derivatives by factors (69, 1 + F).
     """
     parents = chain.parents
-    # from the ends of the limbs to the root, contour (11)
-    for b in range(parents.size - 1, -1, -1):
-        p = parents[b]
-        for i in range(6):
-            for j in range(6):
-                hessians[p, i, j] += hessians[b + 1, i, j]
-            for f in range(gradients.shape[1]):
-                forces[p, i, f] += forces[b + 1, i, f]
+    _sum_towards_root(parents, hessians, forces)
     matrix[:] = 0.0
     gradients[:] = 0.0
     force = np.empty(6)
@@ -715,10 +711,9 @@ def composite_hessian(chain, screws, hessians, forces, matrix, gradients):
                 for j in range(6):
                     total += hessians[joint, i, j] * screws[a, j]
                 force[i] = total
+                # contour (12)
                 for f in range(gradients.shape[1]):
-                    gradients[a, f] += (
-                        screws[a, i] * forces[joint, i, f]
-                    )  # contour (12)
+                    gradients[a, f] += screws[a, i] * forces[joint, i, f]
             # the numbers of the joint and of all joints between it and the root
             other = joint
             while True:
@@ -731,6 +726,18 @@ def composite_hessian(chain, screws, hessians, forces, matrix, gradients):
                 if other == 0:
                     break
                 other = parents[other - 1]
+
+
+@inlined
+def _sum_towards_root(parents, hessians, forces):
+    """Add what moves with each joint to its parent, limbs' ends first. contour (11)."""
+    for b in range(parents.size - 1, -1, -1):
+        p = parents[b]
+        for i in range(6):
+            for j in range(6):
+                hessians[p, i, j] += hessians[b + 1, i, j]
+            for f in range(forces.shape[2]):
+                forces[p, i, f] += forces[b + 1, i, f]
 
 
 @inlined

@@ -172,8 +172,7 @@ def pose_costs(
 
     Raises:
         InputError: if the pixels of a camera are not square, if shapes do not match, or
-        if
-            a number is not finite.
+            if a number is not finite.
 
     Example:
         >>> from posefit import Body, Camera, Silhouette
@@ -190,8 +189,9 @@ def pose_costs(
         (0.0, True)
     """
     check_square(cameras)
-    views = zip(cameras, silhouettes, strict=True)
-    counts = [areas(body, *view, poses, translations, threads) for view in views]
+    counts = []
+    for camera, silhouette in zip(cameras, silhouettes, strict=True):
+        counts.append(areas(body, camera, silhouette, poses, translations, threads))
     costs = [mismatch(view, beta) for view in known_views(counts, silhouettes)]
     # one view need not be copied
     stacked = counts[0][None] if len(counts) == 1 else np.stack(counts)

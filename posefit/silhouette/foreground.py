@@ -257,9 +257,10 @@ def people(
         x, y, wide, tall = roi
         inside[:] = False
         inside[y : y + tall, x : x + wide] = True
+    known = ~shadow
     if ignore is not None:
         inside &= ~ignore
-    known = ~shadow if ignore is None else ~shadow & ~ignore
+        known &= ~ignore
     smooth = cv2.medianBlur(foreground.astype(np.uint8), NOISE)
     changed = np.asarray(smooth > 0) & inside
     largest = people_in(_cleaned(changed, height) & inside)

@@ -54,9 +54,11 @@ def people_in(mask: Mask, known: Mask | None = None) -> list[Pieces]:
     areas[0] = 0
     if count == 1:
         return []
+    if known is not None:
+        known = known[box]
     owners = np.arange(count)
     if count > 2:
-        owners = _owners(labels, stats, areas, None if known is None else known[box])
+        owners = _owners(labels, stats, areas, known)
     totals = np.bincount(owners, areas, count)
     totals[0] = 0.0  # specks near nobody, and the background
     result = list[Pieces]()

@@ -12,11 +12,13 @@ centre, is one row of an array:
     bone      0   0  ...   0  |   1   1  ...   1  |  ...  |   25  ...   25  |  unused
     pose      0   1  ...  15  |   0   1  ...  15  |  ...  |    0  ...   15  |
 
-With this order, loops over places run in vector registers. The cone of a bone and a
-lane is at place `LANES * bone + lane`, and joint j of a lane at place `LANES * j +
-lane`. Bone b ends in joint b + 1, LANES places further. If there is only one pose, its
-cones are next to each other instead, at place `bone`. `stride` is the number of places
-from one bone to the next: LANES or 1.
+With this order, loops over places run in vector registers. For the same reason they
+choose between two values by a conditional expression, not by a branch.
+
+The cone of a bone and a lane is at place `LANES * bone + lane`, and joint j of a lane
+at place `LANES * j + lane`. Bone b ends in joint b + 1, LANES places further. If there
+is only one pose, its cones are next to each other instead, at place `bone`. `stride` is
+the number of places from one bone to the next: LANES or 1.
 
 A bit image is cut into strips of 32 columns. It is (strips, words) uint64; one word
 holds the bits of two rows. As uint32 it is (strips, rows): bit i of image[s, y] is the
@@ -273,6 +275,17 @@ def tangent_segment(normal, gap, first, last, top):
 
 
 @inlined
+def pixel_range(low, high, size):
+    """Return the first pixel between two coordinates, and the one after the last.
+
+    Both are within an image of `size` pixels.
+    """
+    first = min(max(np.ceil(low), 0.0), size)
+    stop = max(min(np.floor(high) + 1.0, size), 0.0)
+    return first, stop
+
+
+@inlined
 def outline_cones(ends, outlines, bounds, stride, strips, width, height):
     """Write each cone's bounds, discs and tangent segments, with rows from its top.
 
@@ -292,15 +305,13 @@ def outline_cones(ends, outlines, bounds, stride, strips, width, height):
         dr = r0 - r1
         dd = dx * dx + dy * dy
         gap = dd - dr * dr
-        # the two unit normals n with n . (c1 - c0) = r0 - r1: along the axis, plus or
-        # minus across it
+        # The tangents have unit normals n with n . (c1 - c0) = r0 - r1: `along` times
+        # the axis (dx, dy), plus or minus `across` times its perpendicular.
         length = 1.0 / max(dd, 1e-30)
         along = dr * length
         across = math.sqrt(max(gap, 0.0)) * length
-        top = min(max(np.ceil(min(v0 - r0, v1 - r1)), 0.0), height)
-        bottom = max(min(np.floor(max(v0 + r0, v1 + r1)) + 1.0, height), 0.0)
-        left = min(max(np.ceil(min(u0 - r0, u1 - r1)), 0.0), width)
-        right = max(min(np.floor(max(u0 + r0, u1 + r1)) + 1.0, width), 0.0)
+        top, bottom = pixel_range(min(v0 - r0, v1 - r1), max(v0 + r0, v1 + r1), height)
+        left, right = pixel_range(min(u0 - r0, u1 - r1), max(u0 + r0, u1 + r1), width)
         visible = (
             (top < bottom)
             & (left < right)
@@ -324,20 +335,18 @@ def outline_cones(ends, outlines, bounds, stride, strips, width, height):
         outlines.end_square[k] = r1 * r1
         first = u0, v0, r0
         last = v1, r1
-        for side in range(2):
-            apart = across if side == 0 else -across
-            normal = along * dx - apart * dy, along * dy + apart * dx
-            u, slope, begin, end = tangent_segment(normal, gap, first, last, top)
-            if side == 0:
-                outlines.left_u[k] = u
-                outlines.left_slope[k] = slope
-                outlines.left_top[k] = begin
-                outlines.left_bottom[k] = end
-            else:
-                outlines.right_u[k] = u
-                outlines.right_slope[k] = slope
-                outlines.right_top[k] = begin
-                outlines.right_bottom[k] = end
+        normal = along * dx - across * dy, along * dy + across * dx
+        u, slope, begin, end = tangent_segment(normal, gap, first, last, top)
+        outlines.left_u[k] = u
+        outlines.left_slope[k] = slope
+        outlines.left_top[k] = begin
+        outlines.left_bottom[k] = end
+        normal = along * dx + across * dy, along * dy - across * dx
+        u, slope, begin, end = tangent_segment(normal, gap, first, last, top)
+        outlines.right_u[k] = u
+        outlines.right_slope[k] = slope
+        outlines.right_top[k] = begin
+        outlines.right_bottom[k] = end
 
 
 @inlined

@@ -5,7 +5,6 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
 from functools import lru_cache
-from itertools import pairwise
 from threading import Lock
 from typing import Any
 
@@ -45,17 +44,21 @@ def parts_of(n: int, threads: int) -> tuple[slice, ...]:
         return (slice(0, n),)
     longest = PART if shares == 1 else SHARED_PART
     rounds = max(-(-n // (shares * longest)), 1)  # rounded up
-    count = shares * rounds
-    borders = [n * part // count for part in range(count + 1)]
-    return tuple(slice(first, stop) for first, stop in pairwise(borders))
+    return _equal_slices(n, shares * rounds)
 
 
 @lru_cache
 def shares_of(n: int, threads: int) -> tuple[slice, ...]:
     """Return slices of n rows, each of which takes long: one a thread."""
-    count = max(min(threads, n), 1)
-    borders = [n * part // count for part in range(count + 1)]
-    return tuple(slice(first, stop) for first, stop in pairwise(borders))
+    return _equal_slices(n, max(min(threads, n), 1))
+
+
+def _equal_slices(n: int, count: int) -> tuple[slice, ...]:
+    """Return slices of n rows, `count` of about equal length."""
+    slices = []
+    for part in range(count):
+        slices.append(slice(n * part // count, n * (part + 1) // count))
+    return tuple(slices)
 
 
 def work_through(
