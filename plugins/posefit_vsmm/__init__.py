@@ -12,7 +12,8 @@ the steps of the patent:
 - 6: `measurement`, the cameras' measurements of a state (6.1), and `imm`, the filter.
 - 7 to 9: `switching`, when a group is activated and when it ends.
 
-`tracker` has the settings, and runs these steps on each frame.
+`tracker` has the settings, and runs these steps on each frame. `first_state` searches
+for a state to start from.
 
 >>> import posefit
 >>> track = posefit.track(

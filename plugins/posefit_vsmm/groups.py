@@ -26,11 +26,20 @@ class Topology(NamedTuple):
         """
         matrix = np.zeros((len(models), len(models)))
         for i, name in enumerate(models):
-            every = [j for j in range(len(models)) if j != i]
-            near = [j for j in every if models[j] in self.neighbours[name]]
-            others = near or every
-            matrix[i, others] = (1.0 - self.stay) / max(1, len(others))
-            matrix[i, i] = self.stay if others else 1.0
+            neighbours = []
+            others = []
+            for j, other in enumerate(models):
+                if j == i:
+                    continue
+                others.append(j)
+                if other in self.neighbours[name]:
+                    neighbours.append(j)
+            successors = neighbours or others
+            if not successors:  # the only model
+                matrix[i, i] = 1.0
+                continue
+            matrix[i, successors] = (1.0 - self.stay) / len(successors)
+            matrix[i, i] = self.stay
         return matrix
 
     def union(self, names: Collection[str]) -> tuple[str, ...]:
@@ -47,9 +56,11 @@ def most_probable(
 ) -> str:
     """Return the name of the group or activity with the highest total probability."""
     known = dict(zip(models, probabilities, strict=True))
-    return max(
-        sets, key=lambda name: sum(known.get(model, 0.0) for model in sets[name])
-    )
+
+    def total(name: str) -> float:
+        return float(sum(known.get(model, 0.0) for model in sets[name]))
+
+    return max(sets, key=total)
 
 
 # Interpretation V1. The rules of step 7 name the first, second and third group.

@@ -110,6 +110,8 @@ def detect(
         points[row] = point
         confidence[row] = max(0.0, 1.0 - distance * distance)
 
+    # The root, the head and the end points come from the silhouette alone. The torso
+    # follows the root, and elbows and knees lie between points that are already placed.
     # VSMM 2.2
     points[AT["root"]] = lines.pixels.mean(axis=0)
     confidence[AT["root"]] = 1.0
@@ -119,6 +121,7 @@ def detect(
     tips, unassigned = _tips(lines.ends, expected[_TIPS], gates[_TIPS], rules.pairs)
     for name, end in tips.items():  # VSMM 2.4
         place(name, end)
+    # before the other points are placed by these
     bias = rules.bias * leg
     points -= bias * (confidence > 0.0)[:, None]
     # VSMM 2.3
@@ -199,13 +202,15 @@ def nearest_pairs(distances: Array) -> tuple[Indices, Indices]:
 
     Each row and each column is used at most once.
     """
-    pairs: list[tuple[int, int]] = []
+    used_rows: list[int] = []
+    used_columns: list[int] = []
     for place in distances.argsort(axis=None, kind="stable"):
         row, column = divmod(int(place), distances.shape[1])
-        if not any(row == first or column == second for first, second in pairs):
-            pairs.append((row, column))
-    rows, columns = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
-    return rows, columns
+        if row in used_rows or column in used_columns:
+            continue
+        used_rows.append(row)
+        used_columns.append(column)
+    return np.array(used_rows, dtype=np.intp), np.array(used_columns, dtype=np.intp)
 
 
 def _elbow(
@@ -262,7 +267,8 @@ def _knees(
     if not len(crossings):
         return {}
     names = ("left knee", "right knee")
-    distances = _distances(expected[[AT[name] for name in names]], crossings)
+    rows = [AT[name] for name in names]
+    distances = _distances(expected[rows], crossings)  # (2, n)
     chosen = crossings_of(distances, crossings @ along / length)
     knees = {}
     for row, name in enumerate(names):
@@ -286,7 +292,9 @@ def two_crossings(distances: Array, places: Array) -> Indices:
 
     They differ even if both knees are expected near the same crossing.
     """
-    together = distances[0][:, None] + distances[1]
+    together = distances[0][:, None] + distances[1]  # (n, n)
+    # Points next to each other along the parallel are one crossing, which cannot be
+    # both knees.
     order = places.argsort()
     groups = np.empty(len(order))
     groups[order] = np.append(0.0, (np.diff(places[order]) > ONE_CROSSING).cumsum())

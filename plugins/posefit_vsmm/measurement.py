@@ -177,7 +177,9 @@ class JointCameras:
         self, camera: Camera, expected: Array, spread: Array
     ) -> ExpectedPoints:
         """Return where a camera is expected to see the points of a state (43,)."""
-        pixels, jacobian = (part[0] for part in self.project(camera, expected[None]))
+        all_pixels, jacobians = self.project(camera, expected[None])
+        pixels = all_pixels[0]
+        jacobian = jacobians[0]
         depth = float((camera.rotation @ expected[:3] + camera.translation)[2])
         metre = float(camera.focal.mean()) / max(depth, MIN_DEPTH)
         covariances = jacobian @ spread @ jacobian.swapaxes(1, 2)

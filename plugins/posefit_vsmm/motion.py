@@ -106,7 +106,7 @@ class MotionModels:
         F is applied to the states without their headings.
         """
         headings, before = without_heading(states)
-        # F was fitted to quaternions with w above 0
+        # q and -q are the same rotation; F was fitted to quaternions with w above 0
         signs = np.where(before[..., :1] < 0.0, -1.0, 1.0)
         inputs = (signs * before).reshape(*states.shape[:-1], -1)
         change = self.share * (
@@ -119,6 +119,7 @@ class MotionModels:
         y = headings[..., 2]
         sine = 2.0 * w * y
         cosine = w * w - y * y
+        # from the body's heading to the world's axes
         side, up, ahead = self.leg * np.moveaxis(change[..., :3], -1, 0)
         way = np.stack(
             [cosine * side + sine * ahead, up, cosine * ahead - sine * side], axis=-1
@@ -195,20 +196,33 @@ def library(shrunk_to: Literal["identity", "zero"] = "identity") -> Library:
     """
     stored = json.loads((files("posefit_vsmm") / "models.json").read_text("utf-8"))
     models: dict[str, Any] = stored["models"]
-    fits = [model[shrunk_to] for model in models.values()]
-    matrices = np.array([fit["matrix"] for fit in fits])
-    offsets = np.array([fit["offset"] for fit in fits])
-    noises = np.array([fit["noise"] for fit in fits])
-    poses = np.array([model["poses"] for model in models.values()])
-    captured = np.array([model["captured"] for model in models.values()])
+    matrices = []
+    offsets = []
+    noises = []
+    poses = []
+    captured_poses = []
+    for model in models.values():
+        fit = model[shrunk_to]
+        matrices.append(fit["matrix"])
+        offsets.append(fit["offset"])
+        noises.append(fit["noise"])
+        poses.append(model["poses"])
+        captured_poses.append(model["captured"])
+    captured = np.array(captured_poses)
+    # they are stored with a few digits, and so are not quite of length 1
     turns = captured.reshape(*captured.shape[:2], TURNS, 4)
     captured = (turns / lengths(turns)).reshape(captured.shape)
-    dependent = DependentJoints(
-        *(np.array(stored["dependent_joints"][key]) for key in ("matrix", "offset"))
-    )
+    joints = stored["dependent_joints"]
     return Library(
-        MotionModels(tuple(models), matrices, offsets, noises, poses, captured),
-        dependent,
+        MotionModels(
+            tuple(models),
+            np.array(matrices),
+            np.array(offsets),
+            np.array(noises),
+            np.array(poses),
+            captured,
+        ),
+        DependentJoints(np.array(joints["matrix"]), np.array(joints["offset"])),
     )
 
 

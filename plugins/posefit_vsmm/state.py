@@ -226,12 +226,13 @@ _SIDES |= {"hip": ("?hipjoint",), "knee": ("?femur",), "foot": ("?foot",)}
 _BETWEEN = dict(_MIDDLE)
 for _name, _joints in _SIDES.items():
     for _side in ("left", "right"):
+        # joint names begin with l or r, in place of the "?" above
         _BETWEEN[f"{_side} {_name}"] = tuple(
             joint.replace("?", _side[0]) for joint in _joints
         )
 POINTS = tuple(_BETWEEN)
 AT = {name: k for k, name in enumerate(POINTS)}
 # (17, 2) the two joints of each point; the same one twice if the point is a joint
-ENDS = np.array(
-    [[JOINTS.index(joints[k]) for k in (0, -1)] for joints in _BETWEEN.values()]
-)
+ENDS = np.empty((len(POINTS), 2), dtype=np.int64)
+for _row, _joints in enumerate(_BETWEEN.values()):
+    ENDS[_row] = JOINTS.index(_joints[0]), JOINTS.index(_joints[-1])

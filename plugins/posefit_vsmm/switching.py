@@ -5,6 +5,15 @@ group is activated next to the present one; a test then ends one of the two. Onl
 `Switching` changes which models are active. There are two forms, the default and the
 patent's letter. They differ in how the filter starts a new group's models: they take a
 `Union` of both groups and return a `Belief` over it.
+
+The active models go through these states, frame by frame:
+
+                  after the first cycles           if the limbs ask for it
+    all models  -------------------------> one group --------------------> two groups
+                         step 5                ^         steps 7 and 8          |
+                                               |                                |
+                                               +---- when one group ends -------+
+                                                            step 9
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,9 +30,9 @@ from posefit_vsmm.imm import IMM, QUATERNIONS, Belief, Measure, Measurement, sta
 from posefit_vsmm.motion import FPS, MotionModels, lifted
 from posefit_vsmm.state import AT, inverse_tangents, unit
 
-# the upper and lower ends of thighs and shanks
-_UPPER = [AT[name] for name in ("left hip", "right hip", "left knee", "right knee")]
-_LOWER = [AT[name] for name in ("left knee", "right knee", "left foot", "right foot")]
+# the upper and lower ends of the left thigh, right thigh, left shank and right shank
+_UPPER = [AT["left hip"], AT["right hip"], AT["left knee"], AT["right knee"]]
+_LOWER = [AT["left knee"], AT["right knee"], AT["left foot"], AT["right foot"]]
 Structure = Literal["variable", "all"]
 MIN_LIMBS = 3  # most of the four thighs and shanks. Interpretation V15
 FIRST_CYCLES = 10  # the patent's cycles over all models before a group is chosen
@@ -82,24 +91,31 @@ def regrouped(
         The belief, with likelihoods of 1.
 
     """
-    every = dict(new)
-    for row, name in enumerate(old):
-        every[name] = (
-            belief.states[row],
-            belief.covariances[row],
-            belief.log_probabilities[row],
-        )
-    chosen = [every[name] for name in models]
+    states = []
+    covariances = []
+    log_probabilities = []
+    for name in models:
+        if name in old:
+            row = old.index(name)
+            state = belief.states[row]
+            covariance = belief.covariances[row]
+            log_probability = belief.log_probabilities[row]
+        else:
+            state, covariance, log_probability = new[name]
+        states.append(state)
+        covariances.append(covariance)
+        log_probabilities.append(log_probability)
     return Belief(
-        np.array([state for state, _, _ in chosen]),
-        np.array([covariance for _, covariance, _ in chosen]),
-        np.array([probability for _, _, probability in chosen]),
+        np.array(states),
+        np.array(covariances),
+        np.array(log_probabilities),
         np.zeros(len(models)),
     )
 
 
 def normalised(belief: Belief) -> Belief:
     """Return a belief with probabilities that sum to 1, equal if all were 0."""
+    # finite numbers instead of -inf: if all were -inf, their differences would be nan
     probabilities = np.maximum(belief.log_probabilities, -1e9)
     return replace(
         belief, log_probabilities=probabilities - np.logaddexp.reduce(probabilities)
@@ -299,12 +315,16 @@ class Switching:
         if self._structure == "all":
             self.group = likely
             return after
+        # at first all models are active
         if self.group is None:
             if self._cycles < self.form.first_cycles(self.models):
                 return after
             return self.keep_only(likely, after)  # VSMM 5
+        # two groups are active: one may end
         if self.candidate_group is not None:
             return self.judged(after)
+        # one group is active: another may join it, and this frame's cycle is repeated
+        # over both
         requested = self._requested_group()
         if requested is None:
             return after
@@ -353,6 +373,8 @@ class Switching:
         assert self.group is not None
         old = [self.active.index(name) for name in self.groups[self.group]]
         new = [self.active.index(name) for name in self.groups[self.candidate_group]]
+        # If one of the two ratios is too low, the new group ends. If both are above 1,
+        # the old one ends.
         # VSMM 9
         self._log_ratio += _log_ratio(after.log_likelihoods, old, new)
         smaller = min(_log_ratio(after.log_probabilities, old, new), self._log_ratio)

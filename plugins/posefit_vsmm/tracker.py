@@ -1,4 +1,4 @@
-"""The tracker `vsmm`: its settings, the first pose, and each frame."""
+"""The tracker `vsmm`: its settings, and its work on each frame."""
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -10,38 +10,19 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.fitting.check import choices, positive
-from posefit.fitting.cost import align
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.skeleton import ANGLES
 from posefit.silhouette.cost import known_views, pose_costs
+from posefit_vsmm.first_state import FirstState
 from posefit_vsmm.groups import TOPOLOGY, most_probable
 from posefit_vsmm.imm import Belief, Measurement
 from posefit_vsmm.joints import JointFilter, Rules, default_rules, patent_rules
 from posefit_vsmm.measurement import JointCameras, JointMeasurement
 from posefit_vsmm.motion import CLIP_FPS, STIFF, library
 from posefit_vsmm.preprocess import Lines, lines_of
-from posefit_vsmm.state import (
-    AT,
-    BONES,
-    ERROR,
-    FIRST_BONE,
-    decode,
-    encode,
-    free_errors,
-    minus,
-    plus,
-)
+from posefit_vsmm.state import AT, BONES, ERROR, FIRST_BONE, decode, free_errors
 from posefit_vsmm.switching import DefaultForm, Form, PatentForm, Structure, Switching
 
-# The first pose: typical poses at several yaws, then samples around the best so far
-YAWS_NEAR = np.radians([-30.0, -15.0, 0.0, 15.0, 30.0])  # from an approximate yaw
-YAWS_ALL_AROUND = np.linspace(-np.pi, np.pi, 12, endpoint=False)
-TYPICAL_SHARE = 0.6  # of the budget: at most this for the typical poses
-DRAWS = 40  # samples per round
-# a quaternion this far from the typical pose adds 1 per cent to the cost
-TYPICAL_DEVIATION = np.radians(15.0)
-# one per round; later rounds use the last one
-DRAW_DEVIATIONS = np.radians([20.0, 12.0, 7.0, 4.0])
 # metres and radians. Interpretation V7
 INITIAL_DEVIATIONS = np.repeat([0.05, np.radians(15.0)], [3, ERROR - 3])
 
@@ -56,8 +37,9 @@ LOST_FRAMES = 8
 # so that the limb is searched for in a larger area.
 MISSING_FRAMES = 2
 MISSING_DEVIATION = np.radians(15.0)
+LIMBS = ("left hand", "right hand", "left foot", "right foot")
 # the bones that move a limb's end
-_LIMBS = {"hand": ("humerus", "radius"), "foot": ("femur", "tibia")}
+_LIMB_BONES = {"hand": ("humerus", "radius"), "foot": ("femur", "tibia")}
 
 
 class Variant(NamedTuple):
@@ -85,6 +67,43 @@ VARIANTS = {
 
 
 @final
+class MissingLimbs:
+    """Counts for how many frames each limb was not detected."""
+
+    def __init__(self, scales: Array) -> None:
+        # (33,) the deviation that each error may have, as a share of a free joint's
+        self._scales = scales
+        self._frames = dict.fromkeys(LIMBS, 0)
+
+    def restart(self) -> None:
+        """Count all limbs as detected."""
+        self._frames = dict.fromkeys(LIMBS, 0)
+
+    def variances(self, measured: Sequence[JointMeasurement]) -> Array:
+        """Count a frame, and return the variances (33,) to add for missing limbs."""
+        extra = np.zeros(ERROR)
+        bones = extra[FIRST_BONE:].reshape(-1, 3)  # a view: writing to it fills `extra`
+        unassigned = any(view.unassigned for view in measured)
+        for limb, frames in self._frames.items():
+            if unassigned and not _detected(limb, measured):
+                self._frames[limb] = frames + 1
+            else:
+                self._frames[limb] = 0
+            if self._frames[limb] < MISSING_FRAMES:
+                continue
+            side, end = limb.split()
+            for bone in _LIMB_BONES[end]:
+                bones[BONES.index(side[0] + bone)] = MISSING_DEVIATION**2
+        return np.asarray(extra * self._scales**2)
+
+
+def _detected(point: str, measured: Sequence[JointMeasurement]) -> bool:
+    """Return whether some camera detected a point."""
+    row = AT[point]
+    return any(view.confidence[row] > 0.0 for view in measured)
+
+
+@final
 class TrackFilter:
     """The state of one track, advanced frame by frame."""
 
@@ -99,7 +118,12 @@ class TrackFilter:
         )
         self.switching = Switching(models, TOPOLOGY, variant.form, tracker.structure)
         self._dependent = library.dependent
-        self._free = free_errors(task.body.skeleton)
+        free = free_errors(task.body.skeleton)
+        self._scales = np.maximum(free, STIFF)
+        self._first_state = FirstState(
+            task, self.switching.models, library.dependent, free
+        )
+        self._missing = MissingLimbs(self._scales)
         self._cameras = JointCameras(
             task.body,
             task.cameras,
@@ -117,8 +141,6 @@ class TrackFilter:
         self._evaluations = 0  # in the current frame
         self._blind_frames = 0
         self._bad_frames = 0
-        # for each limb, the frames since it was last detected; see MISSING_FRAMES
-        self._missing: dict[str, int] = {}
 
     def frame(self, observation: Observation) -> Frame:
         """Return the frame of the next observation."""
@@ -128,7 +150,10 @@ class TrackFilter:
         if observation.usable:
             views = [lines_of(view.mask) for view in observation.silhouettes]
         blind = all(lines is None for lines in views)
-        self._blind_frames = self._blind_frames + 1 if blind else 0
+        if blind:
+            self._blind_frames += 1
+        else:
+            self._blind_frames = 0
         if self._recovers and self._lost():
             self._belief = None
         if self._belief is None:
@@ -178,7 +203,10 @@ class TrackFilter:
         """
         expected, spread = self.switching.predicted(belief)
         measured = self._cameras.detect(views, expected, spread, observation.landmarks)
-        if self._recovers and (extra := self._missing_variances(measured)).any():
+        extra = np.zeros(ERROR)
+        if self._recovers:
+            extra = self._missing.variances(measured)
+        if extra.any():
             belief = self.switching.widened(belief, extra)
             measured = self._cameras.detect(
                 views, expected, spread + np.diag(extra), observation.landmarks
@@ -189,111 +217,27 @@ class TrackFilter:
         for view, joint_filter in zip(measured, self._joint_filters, strict=True):
             points = joint_filter.follow(view.points, view.confidence, view.variances)
             imputed.append(view.imputed(points))
-        joints = [view.points for view in imputed]
-        confidence = [view.confidence for view in measured]
-        details = {"joints": np.array(joints), "confidence": np.array(confidence)}
-        return belief, imputed if self._imputes else measured, details
+        details = {
+            "joints": np.array([view.points for view in imputed]),
+            "confidence": np.array([view.confidence for view in measured]),
+        }
+        if self._imputes:
+            measured = imputed
+        return belief, measured, details
 
     def _start(self, observation: Observation) -> Belief:
         """Return the belief in the state (43,) that fits this frame best.
 
         All models are equally probable.
         """
-        state, self._evaluations = self._best_state(observation)
+        state, self._evaluations = self._first_state.estimate(
+            observation, self._latest, self._rng
+        )
         self.switching.restart()
-        deviations = INITIAL_DEVIATIONS * np.maximum(self._free, STIFF)
+        self._missing.restart()
         self._bad_frames = 0
-        limbs = ("left hand", "right hand", "left foot", "right foot")
-        self._missing = dict.fromkeys(limbs, 0)
+        deviations = INITIAL_DEVIATIONS * self._scales
         return self.switching.start(state, np.diag(deviations**2))
-
-    def _best_state(self, observation: Observation) -> tuple[Array, int]:
-        """Return the state (43,) of least cost in a frame, and the evaluations used.
-
-        Typical poses of the models are tried at several yaws, then samples around the
-        best so far.
-        """
-        budget = self._task.evaluations - 1
-        states = self._typical_states(int(TYPICAL_SHARE * budget))
-        costs, states = self._aligned_costs(observation, states)
-        best = states[costs.argmin()]
-        best_cost = float(costs.min())
-        typical = best
-        evaluations = len(states)
-        for k in range((budget - evaluations) // DRAWS):
-            deviation = DRAW_DEVIATIONS[min(k, len(DRAW_DEVIATIONS) - 1)]
-            errors = self._free * self._rng.normal(0.0, deviation, (DRAWS, ERROR))
-            errors[:, :3] = 0.0
-            costs, states = self._aligned_costs(observation, plus(best, errors))
-            turned = minus(states, typical)[:, 3:] / TYPICAL_DEVIATION  # (40, 30)
-            costs += (turned**2).sum(axis=1)
-            if costs.min() < best_cost:
-                best = states[costs.argmin()]
-                best_cost = float(costs.min())
-            evaluations += DRAWS
-        return best, evaluations
-
-    def _typical_states(self, most: int) -> Array:
-        """Return typical states (n, 43) of the models, turned to several yaws.
-
-        A known pose comes before them: the latest one of a lost track, or a given first
-        pose. There are at most `most` states, but one typical one at least.
-        """
-        task = self._task
-        latest = self._latest
-        yaw = task.yaw
-        anchor = np.asarray(task.anchor)
-        known_pose = None
-        if latest is not None:
-            yaw = float(latest.pose[0])
-            anchor = latest.translation
-            known_pose = latest.pose
-        elif task.first_pose is not None:
-            known_pose = np.concatenate([[yaw or 0.0, 0.0, 0.0], task.first_pose])
-        yaws = YAWS_ALL_AROUND if yaw is None else yaw + YAWS_NEAR
-        states = self.switching.models.typical_states(yaws, anchor)
-        count = min(len(states), most)
-        if known_pose is not None:
-            count -= 1
-        count = max(1, count)
-        # evenly over all models and yaws
-        states = states[np.linspace(0, len(states) - 1, count).astype(np.int64)]
-        if known_pose is None:
-            return states
-        return np.concatenate([encode(known_pose[None], anchor[None]), states])
-
-    def _aligned_costs(
-        self, observation: Observation, states: Array
-    ) -> tuple[Array, Array]:
-        """Return the costs (n,) of states (n, 43), and the states.
-
-        Each state is first moved to where it fits the observation.
-        """
-        task = self._task
-        known = observation.translation
-        poses, places = decode(states, self._dependent)
-        scene = task.body, task.cameras, observation.silhouettes
-        if known is None:
-            places = align(*scene, poses, places, task.threads)
-        else:
-            places[:] = known
-        costs, _ = pose_costs(*scene, poses, places, threads=task.threads)
-        return costs, np.column_stack([places, states[:, 3:]])
-
-    def _missing_variances(self, measured: Sequence[JointMeasurement]) -> Array:
-        """Return the variances (33,) to add for missing limbs; see MISSING_FRAMES."""
-        extra = np.zeros(ERROR)
-        bones = extra[FIRST_BONE:].reshape(-1, 3)  # a view: writing to it fills `extra`
-        unassigned = any(view.unassigned for view in measured)
-        for limb, frames in self._missing.items():
-            detected = any(view.confidence[AT[limb]] > 0.0 for view in measured)
-            self._missing[limb] = frames + 1 if unassigned and not detected else 0
-            if self._missing[limb] < MISSING_FRAMES:
-                continue
-            side, end = limb.split()
-            for bone in _LIMBS[end]:
-                bones[BONES.index(side[0] + bone)] = MISSING_DEVIATION**2
-        return np.asarray(extra * np.maximum(self._free, STIFF) ** 2)
 
     def _frame(
         self,
@@ -316,7 +260,10 @@ class TrackFilter:
         if not self._blind_frames:
             known = known_views(list(counts[:, 0]), observation.silhouettes)
             iou = metrics.iou(np.array(known)).mean()
-            self._bad_frames = self._bad_frames + 1 if iou < LOST_IOU else 0
+            if iou < LOST_IOU:
+                self._bad_frames += 1
+            else:
+                self._bad_frames = 0
         models: dict[str, Any] = {
             "group": switching.group,
             "candidate_group": switching.candidate_group,
