@@ -229,7 +229,7 @@ def test_without_a_place_for_the_cache_every_process_compiles(
 def test_without_room_every_process_compiles(run: Any) -> None:
     full = "import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n"
     assert run(before=full) == (12.0, ["scaled"])
-    full = "import posefit.arrays.compiling as c\nc.MIN_FREE = 1 << 62\n"
+    full = "import posefit.arrays.folders as f\nf.MIN_FREE = 1 << 62\n"
     assert run(before=full) == (12.0, ["scaled"])
     assert run() == (12.0, ["scaled"])
 
