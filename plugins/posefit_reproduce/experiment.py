@@ -69,7 +69,18 @@ class Results:
                 rows[run.view, run.seed] = arrays[name]
         views = sorted({view for view, _ in rows})
         seeds = sorted({seed for _, seed in rows})
-        return np.array([[rows[view, seed] for seed in seeds] for view in views])
+        table = []
+        for view in views:
+            table.append([rows[view, seed] for seed in seeds])
+        return np.array(table)
+
+    def views(self, kind: str) -> list[float]:
+        """Return the views of the runs of a kind, in order."""
+        views = set()
+        for run in self.runs:
+            if run.kind == kind:
+                views.add(run.view)
+        return sorted(views)
 
     def has(self, kind: str, subject: str, method: str) -> bool:
         """Return whether a run of this kind, subject and method exists."""
@@ -87,13 +98,12 @@ class Table(NamedTuple):
     def __str__(self) -> str:
         """The table in Markdown."""
         rule = "|" + "---|" * self.words + "---:|" * (len(self.heads) - self.words)
-        return "\n".join(
-            [
-                f"| {' | '.join(self.heads)} |",
-                rule,
-                *(f"| {' | '.join(row)} |" for row in self.rows),
-            ]
-        )
+        lines = [_line(self.heads), rule, *map(_line, self.rows)]
+        return "\n".join(lines)
+
+
+def _line(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cells)} |"
 
 
 class Claim(NamedTuple):
@@ -146,27 +156,34 @@ def claims_table(name: str, claims: Sequence[Claim]) -> Table:
     The claim with the most subjects gives their order. All intervals hold together at
     the level: Bonferroni's correction.
     """
-    # facts without chance need no share of the error
-    level = 1.0 - (1.0 - LEVEL) / max(sum(claim.values.ndim > 0 for claim in claims), 1)
     texts: dict[str, dict[str, Claim]] = {}
+    uncertain = 0
     for claim in claims:
         texts.setdefault(claim.text, {})[claim.subject] = claim
+        # facts without chance need no share of the error
+        uncertain += claim.values.ndim > 0
+    level = 1.0 - (1.0 - LEVEL) / max(uncertain, 1)
     subjects = [*max(texts.values(), key=len)]
     rows = []
     for text, by_subject in texts.items():
         cells = dict.fromkeys(subjects, "")
+        bounds: dict[str, None] = {}  # an ordered set
         for subject, claim in by_subject.items():
             verdict, mean = claim.verdict(level)
             cells[subject] = f"**{verdict}** {bounded(mean)}"
+            bounds[f"{claim.bound:.3g}"] = None
         # claims with the same text share source, unit, direction and number of runs
         *_, last = by_subject.values()
         count = str(last.values.size) if last.values.ndim else "-"
-        bounds = " / ".join(
-            dict.fromkeys(f"{claim.bound:.3g}" for claim in by_subject.values())
-        )
-        condition = f"{'above' if last.above else 'below'} {bounds} {last.unit}"
+        side = "above" if last.above else "below"
+        condition = f"{side} {' / '.join(bounds)} {last.unit}"
         rows.append([text, last.source, condition, count, *cells.values()])
     return Table(name, ["claim", "where", "holds if", "n", *subjects], rows, 3)
+
+
+def formatted(values: Iterable[float], digits: int) -> list[str]:
+    """Return the text of each number."""
+    return [f"{value:.{digits}f}" for value in values]
 
 
 def bounded(mean: Mean, digits: int = 2) -> str:

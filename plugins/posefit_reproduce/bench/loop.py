@@ -39,7 +39,7 @@ def loop_figures(threads: int | None = None) -> dict[str, Any]:
     """Return the timings in microseconds, and the conditions of the run.
 
     The keys with `opencv` are for a cost function that is called for one pose at a
-    time, as it is usually written. With `opencv_batched`, kinematics and outlines are
+    time, the usual form. With `opencv_batched`, kinematics and outlines are
     computed for 200 poses at once, which is the fastest way to draw with OpenCV.
 
     Args:
@@ -55,11 +55,16 @@ def loop_figures(threads: int | None = None) -> dict[str, Any]:
     together = bench_cost(many)
     proposals = draw_population(alone.space, np.random.default_rng(0), POSES)
     few = proposals[: POSES // 5]
+
+    def opencv_one_by_one() -> None:
+        for pose in few:
+            opencv_costs(alone, pose[None])
+
     jobs: dict[str, Callable[[], object]] = {
         "one": lambda: alone(proposals),
         "all": lambda: together(proposals),
         "population": lambda: alone(proposals[:PARTICLES]),
-        "opencv": lambda: [opencv_costs(alone, pose[None]) for pose in few],
+        "opencv": opencv_one_by_one,
         "opencv_batched": lambda: opencv_costs(alone, few),
     }
     opencv_threads = cv2.getNumThreads()

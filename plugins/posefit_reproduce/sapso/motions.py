@@ -29,7 +29,9 @@ CLIPS = {
     "turn": ("16/16_17", ("16/16_15",)),
     "run": ("16/16_35", ("09/09_01", "127/127_03")),
 }
-ALL_CLIPS = [clip for test, training in CLIPS.values() for clip in (test, *training)]
+ALL_CLIPS: list[str] = []
+for _test, _training in CLIPS.values():
+    ALL_CLIPS += [_test, *_training]
 # the first tracked frame: 16_15 begins with an arm held out that is gone 1/60 s later,
 # and the person of 16_17 walks straight on for two seconds before the quarter turn
 FIRST = {"walk": 1, "turn": 120, "run": 1}
@@ -62,11 +64,13 @@ def paper_motions(clips: str | Path | None, frames: int) -> dict[str, PaperMotio
             )
     motions = {}
     for name, (test, training) in CLIPS.items():
-        first, *others = (_clip(clips, clip) for clip in (test, *training))
+        first = _clip(clips, test)
         followed = first.frames(FIRST[name], min(FIRST[name] + frames, len(first)))
-        motions[name] = PaperMotion(
-            followed, [motion.frames(1, len(motion)) for motion in others]
-        )
+        others = []
+        for clip in training:
+            motion = _clip(clips, clip)
+            others.append(motion.frames(1, len(motion)))
+        motions[name] = PaperMotion(followed, others)
     return motions
 
 

@@ -17,6 +17,7 @@ from posefit_reproduce.experiment import (
     Table,
     bounded,
     claims_table,
+    formatted,
     interval,
 )
 from posefit_reproduce.sapso import paper
@@ -188,8 +189,10 @@ def table_1(analysis: Analysis) -> Table:
         ]
         errors.append(f"{bounded(mean, 1)}, the letter {letter.value:.1f}")
         for label, angles, error in zip(labels, (*pair, *ours), errors, strict=True):
-            cells = [" ".join(f"{value:.1f}" for value in joint) for joint in angles]
-            rows.append([MOTIONS[motion], label, *cells, error])
+            cells = [MOTIONS[motion], label]
+            for joint in angles:
+                cells.append(" ".join(formatted(joint, 1)))
+            rows.append([*cells, error])
     return Table(
         "table-1", ["motion", "", *paper.TABLE_1_JOINTS, "mean error"], rows, 2
     )
@@ -207,7 +210,7 @@ def table_2(analysis: Analysis) -> Table:
             cell = paper.TABLE_2[motion].get(name)
             text = ""
             if cell is not None:
-                text = " / ".join(f"{value:.2f}" for value in cell)
+                text = " / ".join(formatted(cell, 2))
             cells.append(text)
             figures = [
                 bounded(interval(analysis.errors(motion, name))),
@@ -242,7 +245,7 @@ def flaws_table(analysis: Analysis) -> Table:
                 figures[2].append(
                     f"{analysis.errors(motion, name, 'unknown').mean():.2f}"
                 )
-        rows.append([LABELS[name], *(" / ".join(cell) for cell in figures)])
+        rows.append([LABELS[name], *map(" / ".join, figures)])
     heads = [
         "left for right, % of frames",
         "worse than the mean pose, % of runs",
@@ -417,7 +420,6 @@ def few_joints(analysis: Analysis, motion: str) -> Array:
 
 def views_table(analysis: Analysis) -> Table:
     """Return the errors of single images by view, all around, with the yaw unknown."""
-    views = sorted({run.view for run in analysis.results.runs if run.kind == "image"})
     rows = []
     for motion in analysis.motions:
         yaw = analysis.away(motion, OURS, "image")[..., 0]
@@ -430,13 +432,17 @@ def views_table(analysis: Analysis) -> Table:
             ("the wrong way round, %", 100.0 * (yaw > TURNED_ROUND).mean(axis=2)),
         ):
             digits = 0 if "%" in label else 1
-            cells = [f"{value:.{digits}f}" for value in values.mean(axis=1)]
+            cells = formatted(values.mean(axis=1), digits)
             rows.append(
                 [MOTIONS[motion], label, *cells, bounded(interval(values), digits)]
             )
-    return Table(
-        "views", ["motion", "", *(f"{view:.0f}°" for view in views), "mean"], rows, 2
-    )
+    heads = ["motion", "", *_view_heads(analysis, "image"), "mean"]
+    return Table("views", heads, rows, 2)
+
+
+def _view_heads(analysis: Analysis, kind: str) -> list[str]:
+    """Return the heads of columns for the views of a kind of runs."""
+    return [f"{view:.0f}°" for view in analysis.results.views(kind)]
 
 
 def parts_table(analysis: Analysis) -> Table:
@@ -462,15 +468,13 @@ def parts_table(analysis: Analysis) -> Table:
 
 def turn_table(analysis: Analysis) -> Table:
     """Return the errors on the walk with a turn, by view."""
-    views = sorted({run.view for run in analysis.results.runs if run.kind == "track"})
     rows = []
     whole_methods = [name for name in COMPARED["turn"] if name not in PARTS]
     for name in (*whole_methods, "mean_pose"):
         errors = analysis.errors("turn", name)
         worst = analysis.away("turn", name)[..., 0].mean(axis=2)
-        cells = [f"{value:.2f}" for value in errors.mean(axis=1)]
+        cells = formatted(errors.mean(axis=1), 2)
         yaw = f"{worst.mean():.1f}" if name in METHODS else ""
         rows.append([LABELS[name], *cells, bounded(interval(errors)), yaw])
-    return Table(
-        "turn", ["method", *(f"{view:.0f}°" for view in views), "mean", "yaw"], rows
-    )
+    heads = ["method", *_view_heads(analysis, "track"), "mean", "yaw"]
+    return Table("turn", heads, rows)

@@ -72,8 +72,11 @@ class Film:
         """The mask of every frame, segmented by the mean background of the scene."""
         empty, film = _images(self.truth, self.body, self.camera, self.rng)
         background = mean_background(empty)
-        masks = (people(*background.segment(image), None, None)[0] for image in film)
-        return [Observation([Silhouette.of(part.mask)]) for part in masks]
+        observations = []
+        for image in film:
+            person = people(*background.segment(image), None, None)[0]
+            observations.append(Observation([Silhouette.of(person.mask)]))
+        return observations
 
     @property
     def switches(self) -> list[int]:
@@ -89,7 +92,9 @@ class Film:
 def film_of(seed: int, activities: Sequence[Activity] = ACTIVITIES) -> Film:
     """Return the film for a seed."""
     rng = np.random.default_rng(seed)
-    parts = []
+    poses_of_parts = []
+    places_of_parts = []
+    lengths = []
     for activity in activities:
         part = built_in.motion(
             activity.motion,
@@ -98,13 +103,15 @@ def film_of(seed: int, activities: Sequence[Activity] = ACTIVITIES) -> Film:
             speed=rng.uniform(*SPEEDS),
             phase=rng.random(),
         )
-        parts.append(part)
-    poses = np.concatenate([part.poses for part in parts])
-    # striding, but on the spot
-    places = np.concatenate([part.translations * [1.0, 1.0, 0.0] for part in parts])
-    labels = np.repeat(np.arange(len(parts)), [len(part) for part in parts]).tolist()
+        poses_of_parts.append(part.poses)
+        # striding, but on the spot
+        places_of_parts.append(part.translations * [1.0, 1.0, 0.0])
+        lengths.append(len(part))
+    poses = np.concatenate(poses_of_parts)
+    places = np.concatenate(places_of_parts)
+    labels = np.repeat(np.arange(len(lengths)), lengths).tolist()
     # without a blend, the person would jump into the next activity within one frame
-    for first in np.cumsum([len(part) for part in parts])[:-1]:
+    for first in np.cumsum(lengths)[:-1]:
         away = wrapped(poses[first : first + BLEND] - poses[first - 1])
         moved = places[first : first + BLEND]
         share = (np.arange(1, BLEND + 1) / (BLEND + 1))[:, None]
@@ -146,9 +153,13 @@ def _images(
         grain = GRAIN * rng.standard_normal(image.shape, dtype=np.float32)
         return np.asarray(np.clip(image + grain, 0.0, 255.0).astype(np.uint8))
 
+    def empty() -> Iterator[Image]:
+        for _ in range(EMPTY):
+            yield noisy(wall)
+
     def filmed() -> Iterator[Image]:
         for pose, place in zip(truth.poses, truth.translations, strict=True):
             mask = project(body, camera, pose, place)
             yield noisy(np.where(mask[..., None], clothes, wall))
 
-    return (noisy(wall) for _ in range(EMPTY)), filmed()
+    return empty(), filmed()

@@ -4,7 +4,8 @@ There is one film for each seed. The settings of `vsmm` were chosen on films 0 t
 (`TUNED`); results are reported on films 5 to 14.
 """
 
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -102,24 +103,27 @@ def arrays_of(frames: list[Frame]) -> Arrays:
 
     -1 means no group, no candidate or no label.
     """
-    probabilities = np.zeros((len(frames), len(MODELS)))
-    for row, frame in zip(probabilities, frames, strict=True):
-        row[[MODELS.index(name) for name in frame.details["models"]]] = (
-            frame.details.get("probabilities", 0.0)
-        )
-    groups = [None, *(name for name, _ in GROUPS)]
-    series: dict[str, list[Any]] = {
-        "poses": [frame.pose for frame in frames],
-        "translations": [frame.translation for frame in frames],
-        "areas": [frame.areas[0] for frame in frames],
-        "cpu_seconds": [frame.cpu_seconds for frame in frames],
-        "label": [[None, *LABELS].index(frame.activity) - 1 for frame in frames],
-    }
-    for name in ("group", "candidate_group"):
-        series[name] = [groups.index(frame.details[name]) - 1 for frame in frames]
-    for name in DETAILS:
-        series[name] = [frame.details[name] for frame in frames]
-    return {
-        "probabilities": probabilities,
-        **{name: np.array(values) for name, values in series.items()},
-    }
+    groups = [name for name, _ in GROUPS]
+    series: dict[str, list[Any]] = defaultdict(list)
+    for frame in frames:
+        details = frame.details
+        series["poses"].append(frame.pose)
+        series["translations"].append(frame.translation)
+        series["areas"].append(frame.areas[0])
+        series["cpu_seconds"].append(frame.cpu_seconds)
+        series["label"].append(_number(frame.activity, LABELS))
+        for name in ("group", "candidate_group"):
+            series[name].append(_number(details[name], groups))
+        for name in DETAILS:
+            series[name].append(details[name])
+        # of all models, 0 for those that are not active
+        probabilities = np.zeros(len(MODELS))
+        active = [MODELS.index(name) for name in details["models"]]
+        probabilities[active] = details.get("probabilities", 0.0)
+        series["probabilities"].append(probabilities)
+    return {name: np.array(values) for name, values in series.items()}
+
+
+def _number(name: str | None, names: Sequence[str]) -> int:
+    """Return the number of a name; -1 for None."""
+    return -1 if name is None else names.index(name)

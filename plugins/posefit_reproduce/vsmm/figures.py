@@ -132,9 +132,10 @@ def film_stills(film: Film, arrays: Arrays) -> Image:
     for k in STILLS:
         frame = {name: values[k] for name, values in by_frame.items()}
         stills.append(_still(film, frame, k))
-    rows = [np.hstack(stills[k : k + len(stills) // 2]) for k in (0, len(stills) // 2)]
+    half = len(stills) // 2
+    both_rows = np.vstack([np.hstack(stills[:half]), np.hstack(stills[half:])])
     return np.asarray(
-        cv2.resize(np.vstack(rows), None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+        cv2.resize(both_rows, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
     )
 
 

@@ -17,6 +17,7 @@ from posefit_reproduce.experiment import (
     Table,
     bounded,
     claims_table,
+    formatted,
     interval,
 )
 from posefit_reproduce.vsmm.activities import ACTIVITIES, Film, film_of
@@ -37,10 +38,10 @@ POINTS = [AT["right elbow"], AT["right hand"]]
 TRUE_MM = 50.0  # ours: mean distance of joints in space that is negligible
 # range of the patent's mean errors in figure 11
 PATENT_CM = (2.7, 5.2)
-RIGHT = [
-    [MODELS.index(model) for model in sorted(activity.models)]
-    for activity in ACTIVITIES
-]
+# the numbers of the right models of each activity
+RIGHT: list[set[int]] = []
+for _activity in ACTIVITIES:
+    RIGHT.append({MODELS.index(model) for model in _activity.models})
 FIGURES: dict[str, tuple[str, int]] = {
     "elbow_detected": ("elbow to the detected, cm", 1),
     "hand_detected": ("hand to the detected, cm", 1),
@@ -144,7 +145,7 @@ def switching_figures(labels: list[int], arrays: Arrays) -> dict[str, float]:
     in_force = []
     for group, candidate in zip(arrays["group"], candidates, strict=True):
         in_force.append(models_of[group + 1] | models_of[candidate + 1])
-    right = [set(RIGHT[label]) for label in labels]
+    right = [RIGHT[label] for label in labels]
     # an activity may have several right models; one of them in force is enough
     group_is_right = []
     model_is_right = []
@@ -181,7 +182,10 @@ def _delays(labels: list[int], right_group: NDArray[np.bool_]) -> list[int]:
 
     If none ever is, this is the activity's length.
     """
-    starts = [0, *(k for k in range(1, len(labels)) if labels[k] != labels[k - 1])]
+    starts = [0]
+    for frame, (before, now) in enumerate(pairwise(labels), 1):
+        if now != before:
+            starts.append(frame)
     delays = []
     for start, stop in pairwise([*starts, len(labels)]):
         hits = np.flatnonzero(right_group[start:stop])
@@ -235,7 +239,7 @@ def films_table(name: str, methods: Mapping[str, Films]) -> Table:
         for method, films in methods.items():
             values = films[figure][0]
             deviation = values.std(ddof=1) if len(values) > 1 else 0.0
-            cells = [f"{value:.{digits}f}" for value in (*values, deviation)]
+            cells = formatted([*values, deviation], digits)
             rows.append([label, method, *cells])
     numbers = [str(TUNED + k) for k in range(len(rows[0]) - 3)]
     return Table(name, ["film", "", *numbers, "deviation"], rows, 2)
@@ -337,7 +341,7 @@ def labels_table(name: str, results: Results, method: str) -> Table:
     shares = 100.0 * counts / counts.sum(axis=1, keepdims=True)
     rows = []
     for activity, row in zip(ACTIVITIES, shares, strict=True):
-        rows.append([activity.label, *(f"{share:.0f}" for share in row)])
+        rows.append([activity.label, *formatted(row, 0)])
     chance = 100.0 * counts.sum(axis=1).max() / counts.sum()
     return Table(name, [f"% (by chance {chance:.0f})", *LABELS, "none"], rows)
 
@@ -350,7 +354,7 @@ def recovery_table(films: Mapping[str, Films]) -> Table:
     with_it = films["tuned default"]
     without = films[f"tuned {UNRECOVERED}"]
     worse = without["mpjpe"] - with_it["mpjpe"]
-    hands = [f"{each['hand'].mean():.1f}" for each in (with_it, without)]
+    hands = formatted([with_it["hand"].mean(), without["hand"].mean()], 1)
     row = [
         UNRECOVERED,
         bounded(interval(worse), 1),
