@@ -81,7 +81,9 @@ def _stored() -> dict[str, Learned]:
 
 def learned_without(subject: str) -> Learned:
     """Return the statistics of people that do not include this one of the library."""
-    return _stored()[subject if subject in TRAINING_PEOPLE else HELD_OUT_GROUP]
+    if subject not in TRAINING_PEOPLE:
+        subject = HELD_OUT_GROUP
+    return _stored()[subject]
 
 
 @final

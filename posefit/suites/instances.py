@@ -231,9 +231,13 @@ def _single(draft: _Draft, views: int = 1) -> SuiteInstance:
     azimuth = rng.uniform(-np.pi, np.pi)
     pose = _still(draft, pose)
     truth = draft.nearest(space, pose[None])[0]
-    cameras = [draft.camera(azimuth + 0.5 * np.pi * k) for k in range(views)]
     pose = space.decode(truth[None])[0][0]
-    silhouettes = [draft.silhouette(camera, pose) for camera in cameras]
+    cameras = []
+    silhouettes = []
+    for k in range(views):
+        camera = draft.camera(azimuth + 0.5 * np.pi * k)
+        cameras.append(camera)
+        silhouettes.append(draft.silhouette(camera, pose))
     return draft.made(truth, SilhouetteCost(draft.body, cameras, silhouettes, space))
 
 

@@ -198,12 +198,14 @@ def suite(
     made = suite_instance(number, instance, dimension)
     chosen = suite_function(number)
     cost = SuiteCost(name, chosen, made, infeasible)
+    repair = cost.repaired if infeasible == "repair" else None
+    noisy = cost.noisy if chosen.noisy else None
     return Problem(
         cost,
         made.space,
         budget,
-        repair=cost.repaired if infeasible == "repair" else None,
-        noisy=cost.noisy if chosen.noisy else None,
+        repair=repair,
+        noisy=noisy,
         targets=made.truth_cost + TARGETS,
         # without blanks, such as posefit-2026.3_f001_i00017_d09
         id=f"{name}_f{number:03d}_i{instance:05d}_d{dimension:02d}",
@@ -278,7 +280,11 @@ class Suite:
     def functions(self) -> tuple[SuiteFunction, ...]:
         """The functions of the problems."""
         numbers = {number for number, _, _ in self._addresses}
-        return tuple(function for function in FUNCTIONS if function.number in numbers)
+        chosen = []
+        for function in FUNCTIONS:
+            if function.number in numbers:
+                chosen.append(function)
+        return tuple(chosen)
 
     def __len__(self) -> int:
         return len(self._addresses)
@@ -295,7 +301,8 @@ class Suite:
         return problem
 
     def __iter__(self) -> Iterator[Problem]:
-        return (self[index] for index in range(len(self)))
+        for index in range(len(self)):
+            yield self[index]
 
 
 def _numbers(what: str, numbers: object) -> list[int]:

@@ -297,26 +297,34 @@ def method_name(run: SuiteRun) -> str:
 
 def _score(method: str, function: int, runs: Sequence[SuiteRun]) -> SuiteScore:
     """Return the score of runs that differ only in instances, seeds and functions."""
-    reached = np.array(
-        [hits((run.evaluations, run.costs), run.targets) for run in runs]
-    )
-    used = np.array([run.evaluations[-1] for run in runs])
-    times = expected_running_time(reached, used)
+    evaluations_to_targets = []
+    used = []
+    above_truth = []
+    for run in runs:
+        run_hits = hits((run.evaluations, run.costs), run.targets)
+        evaluations_to_targets.append(run_hits)
+        used.append(run.evaluations[-1])
+        above_truth.append(run.cost - run.truth_cost)
+    reached = np.array(evaluations_to_targets)
+    name = "all functions"
     running_times: dict[float, float | None] = {}
-    # the hardest function would decide a mean over all functions
-    for above in () if function == ALL else SHOWN:
-        time = times[int(np.flatnonzero(above == TARGETS)[0])]
-        running_times[above] = float(time) if np.isfinite(time) else None
+    # the hardest function would decide the running time of all functions together
+    if function != ALL:
+        name = suite_function(function).name
+        times = expected_running_time(reached, np.array(used))
+        for above in SHOWN:
+            time = times[int(np.flatnonzero(above == TARGETS)[0])]
+            running_times[above] = float(time) if np.isfinite(time) else None
     return SuiteScore(
         method=method,
         function=function,
-        name="all functions" if function == ALL else suite_function(function).name,
+        name=name,
         dimension=runs[0].dimension,
         budget=runs[0].budget,
         infeasible=runs[0].infeasible,
         looked=runs[0].looked,
         runs=len(runs),
-        above=float(np.median([run.cost - run.truth_cost for run in runs])),
+        above=float(np.median(above_truth)),
         reached=float(np.isfinite(reached).mean()),
         running_times=running_times,
     )
