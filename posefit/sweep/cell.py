@@ -50,10 +50,15 @@ class Cell:
     name: str
     version: str
 
+    @property
+    def spec_text(self) -> str:
+        """The JSON text of `spec`."""
+        return json.dumps(self._values)
+
     @cached_property
     def spec(self) -> dict[str, Any]:
         """The cell's fields as JSON has them: tuples are lists."""
-        spec: dict[str, Any] = json.loads(json.dumps(self._values))
+        spec: dict[str, Any] = json.loads(self.spec_text)
         return spec
 
     @cached_property

@@ -3,10 +3,14 @@
 A cell goes into quarantine after three attempts that failed by its own fault. An
 attempt that was killed from outside is not the cell's fault: the cell is tried again
 after all others, and goes into quarantine only after fifty such attempts.
+
+Waiting for the disk takes longer than a short cell, so the outcomes of cells that end
+soon after each other are written together.
 """
 
 import signal
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -16,6 +20,8 @@ from posefit.errors import InputError
 from posefit.sweep.cell import foreign_plugins
 from posefit.sweep.engine import POLL_SECONDS, Engine, Outcome
 from posefit.sweep.writer import Writer
+
+WRITE_SECONDS = 0.2  # the least time between two writes while cells run
 
 
 @dataclass
@@ -56,10 +62,12 @@ def drive(
     watch(tally)
     waiting = deque(ledger.planned())
     running = dict[str, int]()  # place in the ledger by the cell's key
+    ended: list[tuple[int, Outcome]] = []  # not written yet, with their places
+    written = time.monotonic()
     try:
         with _stopping(say) as stop_requests:
             while len(stop_requests) < 2 and (
-                running or (waiting and not stop_requests)
+                running or ended or (waiting and not stop_requests)
             ):
                 window = engine.window()
                 while waiting and not stop_requests and len(running) < window:
@@ -67,19 +75,18 @@ def drive(
                     cell = ledger.cell(place)
                     running[cell.key] = place
                     engine.submit(cell, foreign_plugins(cell.version))
-                if not (outcomes := engine.wait(POLL_SECONDS)):
-                    continue
-                # a row counts once it is on the disk, so count in a copy until then
-                written = replace(tally)
-                with ledger.transaction():
-                    for outcome in outcomes:
-                        place = running.pop(outcome.job.key)
-                        if not _record(ledger, written, outcome):
-                            waiting.append(place)
-                tally = written
-                watch(tally)
-            tally.stopped = bool(waiting or running)
+                is_due = time.monotonic() - written >= WRITE_SECONDS
+                if ended and (is_due or not running):
+                    waiting += _write(ledger, tally, ended)
+                    watch(tally)
+                    written = time.monotonic()
+                else:
+                    for outcome in engine.wait(POLL_SECONDS):
+                        ended.append((running.pop(outcome.job.key), outcome))
+        waiting += _write(ledger, tally, ended)
     except InputError as error:
+        # the engine may be gone; if it is the ledger, `ended` is empty
+        _write(ledger, tally, ended)
         safe = (
             f"{tally.done} of {tally.cells} cells are done and safe: "
             "run the same command again to continue"
@@ -87,7 +94,27 @@ def drive(
         raise InputError(f"{error}; {safe}") from error
     finally:
         engine.close()
+    tally.stopped = bool(waiting or running)
+    watch(tally)
     return tally
+
+
+def _write(ledger: Writer, tally: Tally, ended: list[tuple[int, Outcome]]) -> list[int]:
+    """Write, count and remove outcomes. Returns the places of cells to try again."""
+    if not ended:
+        return []
+    batch = ended.copy()
+    # so that nothing is written twice, nor tried again if the ledger cannot be written
+    ended.clear()
+    again = []
+    # a row counts once it is on the disk, so count in a copy until then
+    written = replace(tally)
+    with ledger.transaction():
+        for place, outcome in batch:
+            if not _record(ledger, written, outcome):
+                again.append(place)
+    vars(tally).update(vars(written))
+    return again
 
 
 def _record(ledger: Writer, tally: Tally, outcome: Outcome) -> bool:

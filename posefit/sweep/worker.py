@@ -34,8 +34,8 @@ from posefit.limits import end_with_parent, memory
 from posefit.sweep.engine import Limits, Outcome, Run, single_thread, text_of
 
 MARK = "POSEFIT_WORKER"  # the environment variable of a process' mark
-BEGUN = b""  # a worker sends this when it begins a job
-START_SECONDS = 600.0  # the longest that a process takes to begin its first job
+STARTED = b""  # a worker sends this once, when it can take jobs
+START_SECONDS = 600.0  # the longest that a process takes to start
 END_SECONDS = 1.0  # the longest that a process without a connection takes to end
 _starting = threading.Lock()
 # all signals but the two that no process can handle
@@ -68,7 +68,7 @@ class Worker:
 
     Attributes:
         tenant: The same.
-        connection: Becomes readable when a job begins or ends.
+        connection: Becomes readable when the process has started, or a job ends.
     """
 
     def __init__(self, task: bytes, limits: Limits, tenant: str) -> None:
@@ -76,7 +76,8 @@ class Worker:
         self._limits = limits
         self._job: Any = None
         self._deadline = inf
-        self._late = ""  # why the job fails at the deadline
+        self._late = f"its process did not start within {START_SECONDS:g} s"
+        self._has_started = False
         self.connection, other_end = multiprocessing.Pipe()
         self._process = _Process(
             target=_serve,
@@ -100,22 +101,29 @@ class Worker:
         """Send a job to the process."""
         self._job = job
         self._deadline = time.monotonic() + START_SECONDS
-        self._late = f"its process did not begin it within {START_SECONDS:g} s"
+        if self._has_started:
+            self._limit_job()
         # `outcome` tells what became of a process that ended meanwhile
         with suppress(OSError):
             self.connection.send_bytes(cloudpickle.dumps(job))
+
+    def _limit_job(self) -> None:
+        """Limit the time of the job, which begins now."""
+        self._deadline = time.monotonic() + self._limits.seconds
+        self._late = f"it ran past its limit of {self._limits.seconds:g} s"
 
     def outcome(self) -> Outcome | None:
         """Return the outcome of the job, or None if it has not ended.
 
         Unless the job returned or raised an error, its process has ended.
         """
-        answer = BEGUN
+        answer = STARTED
         try:
-            while answer == BEGUN and self.connection.poll():
+            while answer == STARTED and self.connection.poll():
                 answer = self.connection.recv_bytes()
-                self._deadline = time.monotonic() + self._limits.seconds
-                self._late = f"it ran past its limit of {self._limits.seconds:g} s"
+                if answer == STARTED:
+                    self._has_started = True
+                    self._limit_job()
         except (EOFError, OSError):
             # The process has ended, or a job has closed the connection. `join` would
             # wait without limit for a job that has closed its other files, too.
@@ -123,7 +131,7 @@ class Worker:
             while self.is_alive and time.monotonic() < until:
                 time.sleep(0.01)
             return self._ended()
-        if answer == BEGUN:
+        if answer == STARTED:
             if not self.is_alive:
                 return self._ended()
             if time.monotonic() > self._deadline:
@@ -236,38 +244,39 @@ def _interrupts_blocked() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-@contextmanager
-def left_as_it_was() -> Iterator[None]:
-    """Undo afterwards the changes that the body makes in this process.
+class State:
+    """The state of this process that a job may change, to be restored after each.
 
-    These are the folder, the environment variables, `sys.path`, the signal handlers,
-    the global random numbers and NumPy's handling of floating-point errors. A worker
-    runs cells of several methods, and the changes of one must not reach the others.
+    It is the folder, the environment variables, `sys.path`, the signal handlers and the
+    global random numbers. A worker runs cells of several methods, and the changes of
+    one must not reach the others.
     """
-    folder = os.getcwd()
-    variables = dict(os.environ)
-    path = sys.path[:]
-    handlers = _handlers()
-    numbers = random.getstate()
-    bit_generator = mtrand.get_bit_generator()
-    numpy_numbers = np.random.get_state()  # noqa: NPY002
-    try:
-        with np.errstate():
-            yield
-    finally:
-        os.chdir(folder)
+
+    def __init__(self) -> None:
+        self._folder = os.getcwd()
+        self._variables = dict(os.environ)
+        self._path = sys.path[:]
+        self._handlers = _handlers()
+        self._random = random.getstate()
+        self._bit_generator = mtrand.get_bit_generator()
+        self._numpy_random = np.random.get_state()  # noqa: NPY002
+
+    def restore(self) -> None:
+        """Undo all changes since this object was made."""
+        os.chdir(self._folder)
         # most jobs change nothing, and a comparison is faster than writing everything
-        if dict(os.environ) != variables:
+        if dict(os.environ) != self._variables:
             os.environ.clear()
-            os.environ.update(variables)
-        sys.path[:] = path
-        for number, before, now in zip(_SIGNALS, handlers, _handlers(), strict=True):
-            # None means a handler that Python did not install
-            if before is not None and now != before:
-                signal.signal(number, before)
-        random.setstate(numbers)
-        mtrand.set_bit_generator(bit_generator)
-        np.random.set_state(numpy_numbers)  # noqa: NPY002
+            os.environ.update(self._variables)
+        sys.path[:] = self._path
+        if _handlers() != self._handlers:
+            for number, before in zip(_SIGNALS, self._handlers, strict=True):
+                # None means a handler that Python did not install
+                if before is not None:
+                    signal.signal(number, before)
+        random.setstate(self._random)
+        mtrand.set_bit_generator(self._bit_generator)
+        np.random.set_state(self._numpy_random)  # noqa: NPY002
 
 
 def _handlers() -> list[Any]:
@@ -310,6 +319,7 @@ def _serve(
     An answer is a pair: the job's result, and the reason if it failed.
     """
     become_worker(parent, path)
+    connection.send_bytes(STARTED)
     process = os.getpid()
     run: Run | None = None
     while True:
@@ -318,12 +328,16 @@ def _serve(
         except (EOFError, OSError):
             # the driver has ended: `end_with_parent` ends this process and all others
             threading.Event().wait()
-        connection.send_bytes(BEGUN)
         try:
             if run is None:
                 run = _prepared(task)
-            with memory(gigabytes), left_as_it_was():
-                result = run(pickle.loads(job))
+                state = State()
+            try:
+                # NumPy's handling of floating-point errors is restored by `errstate`
+                with memory(gigabytes), np.errstate():
+                    result = run(pickle.loads(job))
+            finally:
+                state.restore()
             answer = cloudpickle.dumps((result, None))
         except MemoryError:
             reason = f"it wanted more memory than its limit of {gigabytes:g} GB"

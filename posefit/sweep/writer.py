@@ -130,7 +130,7 @@ class Writer:
             "INSERT INTO cells (key, kind, spec) VALUES (?, ?, ?) "
             "ON CONFLICT (key) DO UPDATE "
             "SET spec = excluded.spec WHERE spec != excluded.spec",
-            [cell.key, cell.kind, json.dumps(cell.spec)],
+            [cell.key, cell.kind, cell.spec_text],
         )
 
     def planned(self) -> list[int]:

@@ -172,8 +172,9 @@ class Chaos:
                 done = self._signalled([driver, *self._running()], signal.SIGSTOP)
             else:
                 other = self._begun()
-                done = self._driver.poll() is None
                 ended = other.wait(timeout=CONNECT_TIMEOUT_SECONDS) in (0, 1, 130)
+                # it may run if the first driver has ended meanwhile
+                done = self._driver.poll() is None
                 output = (self.folder / "output.txt").read_bytes()
                 self.refused += done and (not ended or b"that process" in output)
             self.happened[event] += done

@@ -1,6 +1,7 @@
 """A ledger keeps every row, whatever becomes of the process that writes it; a strange file is one line."""
 
 import json
+import math
 import os
 import re
 import shlex
@@ -9,7 +10,8 @@ import sqlite3
 import subprocess
 import sys
 import time
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +23,8 @@ from posefit.errors import InputError
 from posefit.registry import registry
 from posefit.sweep.cell import other_version
 from posefit.sweep.command import cells_of, swept
+from posefit.sweep.drive import drive
+from posefit.sweep.engine import Outcome
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.schema import FILE, FORMAT, MIGRATIONS
 from posefit.sweep.writer import ATTEMPTS, LOSSES, Writer
@@ -376,8 +380,6 @@ def test_a_driver_that_was_killed_holds_nothing(tmp_path: Path) -> None:
 def test_a_full_disk_ends_the_sweep_in_one_line_and_finished_rows_are_safe(
     tmp_path: Path,
 ) -> None:
-    from posefit.sweep.drive import drive
-
     folder = filled(tmp_path / "results", 3)
     with Writer(folder / FILE) as ledger:
         ledger.plan(cells(50))
@@ -392,6 +394,64 @@ def test_a_full_disk_ends_the_sweep_in_one_line_and_finished_rows_are_safe(
     safe = re.search(r"(\d+) of 50", str(caught.value))
     assert 3 <= len(rows_in(folder)) == int(safe[1]) < 50
     filled(folder, 50)
+
+
+class Leaves(Instant):
+    """An engine with a window of two that is gone once it returned three outcomes."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.returned = 0
+
+    def window(self) -> int:
+        if self.returned == 3:
+            raise InputError("the engine is gone")
+        return 2
+
+    def wait(self, seconds: float) -> list[Outcome]:
+        self.returned += 1
+        return [self.ended.pop(0)]
+
+
+def test_cells_that_ended_when_the_engine_is_lost_are_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # nothing is written while cells run
+    monkeypatch.setattr("posefit.sweep.drive.WRITE_SECONDS", math.inf)
+    folder = tmp_path / "results"
+    with Writer(folder / FILE) as ledger:
+        ledger.plan(cells(8))
+        with pytest.raises(
+            InputError, match="the engine is gone; 3 of 8 cells are done and safe"
+        ):
+            drive(ledger, Leaves(), print)
+    assert len(rows_in(folder)) == 3
+
+
+class Counting(Writer):
+    """Counts its writes."""
+
+    writes = 0
+
+    @contextmanager
+    def transaction(self) -> Iterator[None]:
+        self.writes += 1
+        with super().transaction():
+            yield
+
+
+@pytest.mark.parametrize(("seconds", "writes"), [(math.inf, 1), (0.0, 8)])
+def test_outcomes_that_come_together_are_written_together(
+    seconds: float, writes: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("posefit.sweep.drive.WRITE_SECONDS", seconds)
+    tallies: list[int] = []
+    with Counting(tmp_path / "results" / FILE) as ledger:
+        ledger.plan(cells(8))
+        ledger.writes = 0
+        drive(ledger, Instant(), print, lambda tally: tallies.append(tally.done))
+    assert ledger.writes == writes
+    assert tallies[-1] == len(rows_in(tmp_path / "results")) == 8
 
 
 def test_only_a_cells_own_faults_count_towards_its_three_attempts_and_fifty_losses_are_too_many(

@@ -206,7 +206,7 @@ def test_a_process_runs_jobs_of_one_tenant_only(
     assert len(set().union(*processes.values())) == sum(map(len, processes.values()))
 
 
-def test_a_process_that_does_not_begin_its_job_is_given_up(
+def test_a_process_that_does_not_start_is_given_up(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # no process starts at once
@@ -215,7 +215,7 @@ def test_a_process_that_does_not_begin_its_job_is_given_up(
         pool.submit(cells(1)[0])
         while not (ended := pool.wait(0.0)):
             pass
-    assert ended[0].reason == "its process did not begin it within 0 s"
+    assert ended[0].reason == "its process did not start within 0 s"
 
 
 def process_of(_: TrackCell) -> int:
