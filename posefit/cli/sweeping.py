@@ -87,7 +87,9 @@ def sweep(
 @click.command()
 @click.argument("ledger", metavar="DIR...", nargs=-1, required=True)
 @click.option("--out", metavar="FILE.html", help="The page.")
-@click.option("--csv", metavar="FILE", help="Write all rows to this file.")
+@click.option(
+    "--csv", metavar="FILE", help="Write all rows of these methods to this file."
+)
 @click.option(
     "--figures",
     metavar="DIR",

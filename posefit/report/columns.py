@@ -61,6 +61,12 @@ class Column:
         """Its name."""
         return self.measure.name
 
+    @property
+    def title(self) -> str:
+        """Its label and unit, the title of a table's column."""
+        unit = _SYMBOLS.get(self.measure.unit, self.measure.unit)
+        return f"{self.measure.label} {unit}".rstrip()
+
     def value(self, row: Mapping[str, Any]) -> float:
         """Return the figure of a row, or nan if the row does not have it."""
         value: Any = row
@@ -71,9 +77,8 @@ class Column:
     def as_dict(self) -> dict[str, Any]:
         """Return the data with which the page shows the figure."""
         measure = self.measure
-        symbol = _SYMBOLS.get(measure.unit, measure.unit)
         return {
-            "title": f"{measure.label} {symbol}".rstrip(),
+            "title": self.title,
             "about": f"{measure.meaning} ({self.name})",
             "digits": measure.digits,
             "factor": measure.factor,
@@ -88,7 +93,6 @@ class Score:
 
     Attributes:
         column: The figure.
-        title: The title of its column in a printed table.
         axis: The label of its axis.
         sentence: A part of a sentence, with `{}` for the value.
         unit: The unit of its values.
@@ -99,7 +103,6 @@ class Score:
     """
 
     column: Column
-    title: str
     axis: str
     sentence: str
     unit: str

@@ -3,7 +3,7 @@
 import shlex
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from posefit.errors import printable
@@ -21,6 +21,8 @@ from posefit.sweep.ledger import Ledger
 REASONS = 5
 MAX_MISSING = 20
 MAX_BLOCKS = 1_000_000  # tables only say that more are needed
+
+Problem = tuple[str, list[str]]  # a sentence about the runs, and details
 
 
 def data_of(ledger: Ledger, runs: Runs, standings: Standings | None) -> dict[str, Any]:
@@ -113,73 +115,75 @@ def _header(runs: Runs, contest: Contest | None) -> dict[str, Any]:
         "notes": _notes(runs, contest),
         "done": len(runs),
         "failed": len(runs.failures),
-        "problems": _problems(runs, contest),
+        "problems": list(_problems(runs, contest)),
     }
 
 
-def _problems(runs: Runs, contest: Contest | None) -> list[tuple[str, list[str]]]:
-    """Return a sentence for each problem, with its most frequent details.
-
-    Problems are failures, runs that are not compared, and warnings.
-    """
-    problems = []
-
-    def add(text: str, details: Sequence[str] = (), most: int = REASONS) -> None:
-        """Add a problem with at most `most` details."""
-        named = list(details[:most])
-        if len(details) > most:
-            named.append(f"and {len(details) - most:,} more")
-        problems.append((text, named))
-
+def _problems(runs: Runs, contest: Contest | None) -> Iterator[Problem]:
+    """Yield the problems: failures, runs that are not compared, and warnings."""
     if runs.failures:
         reasons: Counter[str] = Counter()
         for failure in runs.failures:
             reasons.update(failure.reasons)
-        text = "; ".join(f"{name} {count}" for name, count in runs.failed.items())
         failed = counted(len(runs.failures), "cell")
-        add(
-            f"{failed} failed, left out of all figures: {text}",
-            [f"{n} x {reason}" for reason, n in reasons.most_common()],
+        names = "; ".join(f"{name} {count}" for name, count in runs.failed.items())
+        yield _problem(
+            f"{failed} failed, left out of all figures: {names}", _frequent(reasons)
         )
     unfinished = [name for name in runs.failed if name not in runs.methods]
     if unfinished:
         names = "; ".join(unfinished)
-        add(f"no cell finished, so not on the leaderboard: {names}")
+        yield _problem(f"no cell finished, so not on the leaderboard: {names}")
     builds = {variant["version"].partition(", ")[0] for variant in runs.variants}
     if len(builds) > 1:
         names = "; ".join(sorted(builds))
-        add(f"methods ran with different versions: {names}")
+        yield _problem(f"methods ran with different versions: {names}")
     if contest is not None:
-        others = []
-        for m, name in enumerate(runs.methods):
-            if m not in contest.methods:
-                others.append(name)
-        if others:
-            add(
-                "too few runs in common with the others, so not compared; the "
-                f"leaderboard has the means of all their runs: {'; '.join(others)}"
-            )
-        if unpaired := unpaired_sentence(contest):
-            add(unpaired)
-        details = []
-        for i, methods in contest.missing:
-            why = "no seed in common"
-            if methods:
-                why = f"no run of {'; '.join(runs.methods[m] for m in methods)}"
-            details.append(f"{runs.instances[i]}: {why}")
-        if details:
-            instances = counted(len(details), "instance")
-            text = f"left out of the comparison, for every method: {instances}"
-            add(text, details, MAX_MISSING)
+        yield from _left_out(runs, contest)
     if runs.warnings:
         warnings: Counter[str] = Counter()
         for texts in runs.warnings.values():
             warnings.update(texts)
-        add(
-            f"{counted(len(runs.warnings), 'run')} with a warning",
-            [f"{n} x {warning}" for warning, n in warnings.most_common()],
+        runs_words = counted(len(runs.warnings), "run")
+        yield _problem(f"{runs_words} with a warning", _frequent(warnings))
+
+
+def _left_out(runs: Runs, contest: Contest) -> Iterator[Problem]:
+    """Yield the problems about methods, runs and instances that are not compared."""
+    others = []
+    for m, name in enumerate(runs.methods):
+        if m not in contest.methods:
+            others.append(name)
+    if others:
+        yield _problem(
+            "too few runs in common with the others, so not compared; the "
+            f"leaderboard has the means of all their runs: {'; '.join(others)}"
         )
-    return problems
+    if unpaired := unpaired_sentence(contest):
+        yield _problem(unpaired)
+    details = []
+    for i, methods in contest.missing:
+        why = "no seed in common"
+        if methods:
+            why = f"no run of {'; '.join(runs.methods[m] for m in methods)}"
+        details.append(f"{runs.instances[i]}: {why}")
+    if details:
+        instances = counted(len(details), "instance")
+        text = f"left out of the comparison, for every method: {instances}"
+        yield _problem(text, details, MAX_MISSING)
+
+
+def _problem(text: str, details: Sequence[str] = (), most: int = REASONS) -> Problem:
+    """Return a problem with at most `most` of its details."""
+    named = list(details[:most])
+    if len(details) > most:
+        named.append(f"and {len(details) - most:,} more")
+    return text, named
+
+
+def _frequent(counts: Counter[str]) -> list[str]:
+    """Return texts with their numbers, the most frequent first."""
+    return [f"{count} x {text}" for text, count in counts.most_common()]
 
 
 def _notes(runs: Runs, contest: Contest | None) -> list[str]:

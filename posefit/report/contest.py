@@ -167,6 +167,8 @@ class Runs:
         data: The other data of each row, by the names of `Kind.data`.
         warnings: The warnings of each row that has some, by its index.
         failures: The quarantined cells.
+        chosen: The JSON texts of the fields that define each method of the report, also
+            of those that only failed.
     """
 
     kind: Kind
@@ -184,11 +186,12 @@ class Runs:
     data: Mapping[str, Sequence[Any]]
     warnings: Mapping[int, tuple[str, ...]]
     failures: tuple[Failure, ...]
+    chosen: frozenset[str]
 
     def __len__(self) -> int:
         return len(self.keys)
 
-    @property
+    @cached_property
     def settings(self) -> list[str]:
         """The settings of each method, as a text."""
         return [

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from posefit.report.contest import Baseline, Contest, Runs, contest_of
@@ -108,59 +108,67 @@ def leaderboard(contest: Contest) -> list[Standing]:
     2. The other methods that take part, by their score.
     3. Methods that do not take part, with the averages of all their own runs.
     """
-    kind = contest.runs.kind
-    ends = dict[int, tuple[float, float]]()
-    for place, m in enumerate(contest.methods):
-        low, high = kind.interval(contest, place)
-        if math.isfinite(low):
-            ends[m] = low, high
+    runs = contest.runs
+    rows = []
+    for m, name in enumerate(runs.methods):
+        rows_of_method = contest.rows_of(m)
+        row = Standing(
+            method=m,
+            name=name,
+            settings=runs.settings[m],
+            runs=len(rows_of_method),
+            failed=runs.failed[name],
+            warned=sum(k in runs.warnings for k in rows_of_method.tolist()),
+            taking_part=m in contest.methods,
+            figures=runs.kind.figures(runs, rows_of_method),
+            interval=_interval(contest, m),
+            lost_tracks=runs.lost_tracks(rows_of_method),
+        )
+        rows.append(row)
+    best_first = _best_first(contest, rows)
+    effects = _effects(contest, best_first[0].method)
+    return [replace(row, effect=effects.get(row.method)) for row in best_first]
 
-    def badness(m: int) -> tuple[float, float]:
+
+def _interval(contest: Contest, method: int) -> tuple[float, float] | None:
+    """Return the ends of the 95 % interval of a method's score, None if unknown."""
+    if method not in contest.methods:
+        return None
+    ends = contest.runs.kind.interval(contest, contest.methods.index(method))
+    return ends if math.isfinite(ends[0]) else None
+
+
+def _best_first(contest: Contest, rows: Sequence[Standing]) -> list[Standing]:
+    """Return the rows of a leaderboard in its order."""
+    score = contest.runs.kind.score
+
+    def badness(row: Standing) -> tuple[float, float]:
         """Return a key that is lower for better methods.
 
         Those without a score are last.
         """
-        value = figures[m][kind.score.name]
+        value = row.figures[score.name]
         if value is None:
             return math.inf, 0.0
         # of searches with equal shares of targets, the lower cost is better
-        return (-value if kind.score.down else value), figures[m].get("above") or 0.0
+        return (-value if score.down else value), row.figures.get("above") or 0.0
 
-    def order(m: int) -> tuple[Any, ...]:
-        worse = m not in contest.methods or m in worse_methods
-        lost = 0 if worse else contest.runs.lost_tracks(rows[m]) or 0
-        return m not in contest.methods, worse, lost, badness(m)
-
-    numbers = range(len(contest.runs.methods))
-    rows = [contest.rows_of(m) for m in numbers]
-    figures = [kind.figures(contest.runs, rows_of_method) for rows_of_method in rows]
     # the method of the best score comes first only if it lost no more than others that
     # a test does not separate from it
-    best = min(contest.methods, key=badness)
+    best = min((row for row in rows if row.taking_part), key=badness)
     worse_methods = set()
-    for m, test in contest.tests_against(best):
+    for m, test in contest.tests_against(best.method):
         if test.p_value < SIGNIFICANCE:
             worse_methods.add(m)
-    best_first = sorted(numbers, key=order)
-    effects = _effects(contest, best_first[0])
-    board = []
-    for m in best_first:
-        name = contest.runs.methods[m]
-        row = Standing(
-            method=m,
-            name=name,
-            settings=contest.runs.settings[m],
-            runs=len(rows[m]),
-            failed=contest.runs.failed[name],
-            warned=sum(k in contest.runs.warnings for k in rows[m].tolist()),
-            taking_part=m in contest.methods,
-            figures=figures[m],
-            interval=ends.get(m),
-            lost_tracks=contest.runs.lost_tracks(rows[m]),
-            effect=effects.get(m),
-        )
-        board.append(row)
-    return board
+
+    def order(row: Standing) -> tuple[Any, ...]:
+        if not row.taking_part:
+            return 3, badness(row)
+        if row.method in worse_methods:
+            return 2, badness(row)
+        return 1, row.lost_tracks or 0, badness(row)
+
+    return sorted(rows, key=order)
 
 
 def _effects(contest: Contest, first: int) -> dict[int, Effect]:

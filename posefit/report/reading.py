@@ -189,7 +189,13 @@ def runs_of(
         data=data,
         warnings=warnings,
         failures=tuple(failures),
+        chosen=frozenset(json_of(rows.variants[m]) for m in chosen),
     )
+
+
+def is_of(runs: Runs, spec: Mapping[str, Any]) -> bool:
+    """Return whether a cell's method is one of a report's."""
+    return json_of(_variant(spec)) in runs.chosen
 
 
 def _ranks(values: "NDArray[np.int64]", order: Sequence[int]) -> Array:

@@ -45,7 +45,6 @@ COLUMNS = {
 }
 SCORE = Score(
     column=COLUMNS["reached"],
-    title="targets %",
     axis="share of targets reached",
     sentence="reached {} of all targets",
     unit=" %",

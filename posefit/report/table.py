@@ -38,9 +38,9 @@ def board_cells(score: Score, row: Standing) -> dict[str, str]:
         if row.effect.p < LEAST_P:
             p = f"< {LEAST_P}"
     cells = {
-        score.title: number(row.figures[score.name]),
+        score.column.title: number(row.figures[score.name]),
         "95 % interval": ends,
-        "behind": behind,
+        f"behind {score.points.strip()}": behind,
         "p": p,
     }
     if row.lost_tracks is None:
@@ -66,7 +66,7 @@ def board_lines(standings: Standings) -> list[str]:
         value = baseline.figures[score.name]
         if baseline.name == LOSS_BASELINE and value is not None:
             names.append(baseline.title)
-            cells.append({score.title: f"{value:.{score.digits}f}"})
+            cells.append({score.column.title: f"{value:.{score.digits}f}"})
     widths = {}
     for title in cells[0]:
         lengths = [len(row.get(title, "")) for row in cells]

@@ -128,7 +128,6 @@ def _columns() -> list[Column]:
 COLUMNS = {column.name: column for column in _columns()}
 SCORE = Score(
     column=COLUMNS[LOSS],
-    title="error with losses",
     axis="error with losses in degrees",
     sentence="has an error with losses of {}",
     unit="°",

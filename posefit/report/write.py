@@ -10,10 +10,10 @@ from posefit.page.document import plain
 from posefit.reading import cut
 from posefit.report.coco import write_coco
 from posefit.report.content import data_of
-from posefit.report.contest import Kind
+from posefit.report.contest import Runs
 from posefit.report.leaderboard import standings_of
 from posefit.report.page import MARK, document
-from posefit.report.reading import runs_of
+from posefit.report.reading import is_of, runs_of
 from posefit.report.table import LATEX_MARK, board_lines, latex_table
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.repeat import repeat_command
@@ -49,7 +49,7 @@ def write_report(
         path: A ledger, a folder of ledgers, or several of these.
         out: The page. With None no page is written.
         figures: A folder for figures (PNG, PDF) and the leaderboard (CSV).
-        csv: A file of all rows.
+        csv: A file of all rows of these methods.
         latex: A file of the leaderboard as a LaTeX table.
         coco: A new folder of single searches as COCO's files.
         methods: The methods to compare, by their names in the report or in the plan.
@@ -103,7 +103,7 @@ def write_report(
             write_figures(standings, figures)
         if csv is not None:
             with replaced_file(csv, CSV_MARK.encode()) as building:
-                write_csv(_csv_rows(ledger, runs.kind), building)
+                write_csv(_csv_rows(ledger, runs), building)
         if coco is not None:
             write_coco(runs, coco)
         if latex is not None and standings is not None:
@@ -130,16 +130,18 @@ def _write(path: str, mark: str, parts: Iterable[str]) -> None:
         file.writelines(parts)
 
 
-def _csv_rows(ledger: Ledger, kind: Kind) -> Iterator[dict[str, Any]]:
-    """Yield the rows of the CSV file.
+def _csv_rows(ledger: Ledger, runs: Runs) -> Iterator[dict[str, Any]]:
+    """Yield the rows of the CSV file, which are those of the report's methods.
 
     They also have the figures that are computed from a row, and the command that
     repeats it.
     """
     for row in ledger.all_rows():
+        if not is_of(runs, row["spec"]):
+            continue
         columns = flat(row)
         if row["status"] == "done":
-            columns |= kind.computed(row)
+            columns |= runs.kind.computed(row)
         yield {**columns, "command": repeat_command(row["spec"])}
 
 

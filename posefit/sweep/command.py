@@ -54,14 +54,18 @@ def swept(
     """
     from tqdm.auto import tqdm
 
-    with closing(engine), Writer(Path(out) / file_of(shard)) as ledger:
+    from posefit.silhouette.cost import compile_kernels
+
+    # else each worker would compile them
+    compile_kernels()
+    file, *others = ledgers_of(out, shard)
+    with closing(engine), Writer(file) as ledger:
         for version, count in ledger.versions().items():
             if any(map(other_version, version.split(", "))):
                 say(
                     f"{counted(count, 'row')} in {out} are of another version, "
                     f"{cut(version)}, and do not count here"
                 )
-        others = shards_in(Path(out)) if shard is None else []
         ledger.plan(cells_of(plan, shard), done_in(others))
         if retry_quarantined:
             count = ledger.release_quarantined()
@@ -122,12 +126,15 @@ def cells_of(plan: Iterable[Cell], shard: str | None) -> Iterator[Cell]:
     return (cell for cell in plan if int(cell.key, 16) % count == number - 1)
 
 
-def shards_in(out: Path) -> list[Path]:
-    """Return the ledgers of shards in a folder.
+def ledgers_of(out: str | Path, shard: str | None) -> list[Path]:
+    """Return the ledgers whose finished cells a run does not repeat, its own first.
 
-    A run without shards does not repeat their cells.
+    The others are those of shards, for a run without shards.
     """
-    return sorted(out.glob(SHARDS))
+    ledgers = [Path(out) / file_of(shard)]
+    if shard is None:
+        ledgers += sorted(Path(out).glob(SHARDS))
+    return ledgers
 
 
 def done_in(ledgers: Iterable[Path]) -> set[str]:
@@ -163,9 +170,6 @@ def engine(
         raise InputError(f"--workers must be at least 1, got {workers}")
 
     def start() -> Engine:
-        from posefit.silhouette.cost import compile_kernels
-
-        compile_kernels()
         if scheduler is not None:
             from posefit.sweep.cluster import Cluster
 

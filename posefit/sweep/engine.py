@@ -8,8 +8,6 @@ There are two engines: the processes of this machine (pool.py) and the workers o
 scheduler (cluster.py). The ledger decides the order and keeps the state.
 """
 
-import os
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -20,12 +18,6 @@ from posefit.limits import GIGABYTES, SECONDS
 
 Run = Callable[[Any], Any]
 POLL_SECONDS = 0.2
-THREADS = (
-    "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "VECLIB_MAXIMUM_THREADS",
-)
 
 
 @dataclass(frozen=True)
@@ -91,19 +83,3 @@ def text_of(error: BaseException) -> str:
     """Return an exception's type and message in one line."""
     message = " ".join(str(error).split())
     return printable(f"{type(error).__name__}: {message}".removesuffix(": "))
-
-
-def single_thread() -> None:
-    """Limit each library of this process to one thread, as cells run side by side."""
-    # these libraries read the variables when they are loaded
-    os.environ.update(dict.fromkeys(THREADS, "1"))
-    # numba, once loaded, raises an error at its next compilation if the number changed
-    if "numba" not in sys.modules:
-        os.environ["NUMBA_NUM_THREADS"] = "1"
-    import cv2
-    import numba
-    from threadpoolctl import threadpool_limits
-
-    cv2.setNumThreads(1)
-    numba.set_num_threads(1)
-    threadpool_limits(1)

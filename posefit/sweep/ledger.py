@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 
 OPEN_SECONDS = 5.0  # the longest wait for a program that locks a file
 MAX_VALUE_BYTES = 200_000_000  # of one value that is read
+STATUSES = ("done", "quarantined")  # of rows
 OF = "FROM cells WHERE status = ? ORDER BY rowid"  # the end of most queries
 
 
@@ -72,37 +73,30 @@ class Ledger:
     def __init__(self, *paths: str | Path) -> None:
         self.path = Path(paths[0])
         # each file once, even if it is named twice
-        files: dict[Path, None] = {}
+        names: dict[Path, None] = {}
         for path in paths:
-            files.update(dict.fromkeys(_files(Path(path))))
-        self.files = list(files)
-        self._open: list[tuple[Path, sqlite3.Connection]] = []
-        # The cells that are done or quarantined now, by file and status: their rowids,
-        # rising. Keys of a million cells would take much memory.
-        self._counted: dict[tuple[int, str], array[int]] = {}
+            names.update(dict.fromkeys(_names(Path(path))))
+        self._files: list[_File] = []
         with ExitStack() as opened:
             opened.callback(self.close)
-            for file in self.files:
-                self._open.append((file, _reader(file)))
+            for name in names:
+                self._files.append(_File(name))
             self._count()
             opened.pop_all()
 
     def _count(self) -> None:
-        """Note the cells that count.
-
-        If several files have a cell, the first finished one counts, else the first.
-        """
-        several = len(self._open) > 1
+        """Note the cells that count."""
+        # the keys of one file differ, so it needs no set of perhaps a million
+        several = len(self._files) > 1
         seen = set[str]()
-        for status in ("done", "quarantined"):
-            for k in range(len(self._open)):
-                counted = self._counted[k, status] = array("q")
-                for rowid, key in self._query(k, f"SELECT rowid, key {OF}", status):
+        for status in STATUSES:
+            for file in self._files:
+                for rowid, key in file.query(f"SELECT rowid, key {OF}", status):
                     if several and key in seen:
                         continue
                     if several:
                         seen.add(key)
-                    counted.append(rowid)
+                    file.counted[status].append(rowid)
 
     def __enter__(self) -> Self:
         return self
@@ -111,23 +105,24 @@ class Ledger:
         self.close()
 
     def __len__(self) -> int:
-        return sum(len(self._counted[k, "done"]) for k in range(len(self._open)))
+        return sum(len(file.counted["done"]) for file in self._files)
 
     def done(self) -> set[str]:
         """Return the keys of the finished cells."""
         done = set[str]()
-        for k in range(len(self._open)):
-            for _, key in self._chosen(k, "key", "done"):
+        for file in self._files:
+            for (key,) in file.cells("key", "done"):
                 done.add(key)
         return done
 
     @property
     def changed(self) -> float:
         """The time of the latest change to any of its files, in seconds since 1970."""
-        logs = [Path(f"{file}{WAL}") for file in self.files]
+        files = [file.path for file in self._files]
+        logs = [Path(f"{file}{WAL}") for file in files]
         # a reader makes a log as well, which stays empty
         written = [log for log in logs if log.exists() and log.stat().st_size]
-        return max(path.stat().st_mtime for path in (*self.files, *written))
+        return max(path.stat().st_mtime for path in (*files, *written))
 
     @property
     def version(self) -> str:
@@ -136,8 +131,8 @@ class Ledger:
         Without finished rows, the installed version.
         """
         builds = set()
-        for k in range(len(self._open)):
-            for version, _ in self._query(k, VERSIONS):
+        for file in self._files:
+            for version, _ in file.query(VERSIONS):
                 # the versions of plugins follow after commas
                 builds.add(str(version).partition(", ")[0])
         if not builds:
@@ -168,8 +163,8 @@ class Ledger:
 
     def close(self) -> None:
         """Close its files."""
-        for _, database in self._open:
-            database.close()
+        for file in self._files:
+            file.close()
 
     def damaged_row(self, key: str, error: Exception) -> InputError:
         """Return the error of a row that was changed since posefit wrote it.
@@ -177,42 +172,62 @@ class Ledger:
         Its message has a command that plans the cell again.
         """
         name = quoted(key[:8])[1:-1]
-        file = self.files[0]
-        query = "SELECT rowid, status FROM cells WHERE key = ?"
-        for k, (path, _) in enumerate(self._open):
-            for rowid, status in self._query(k, query, key):
-                if _is_in(rowid, self._counted.get((k, status), [])):
-                    file = path
+        having = [file.path for file in self._files if file.counts(key)]
+        path, *_ = having or [self._files[0].path]
         statement = f"UPDATE cells SET status = 'planned' WHERE key LIKE '{name}%'"
         return InputError(
-            f"{file}: the row of cell {name} must be written by posefit: "
+            f"{path}: the row of cell {name} must be written by posefit: "
             f"{cut(text_of(error))}; "
-            f'to run it again: sqlite3 {shlex.quote(str(file))} "{statement}"'
+            f'to run it again: sqlite3 {shlex.quote(str(path))} "{statement}"'
         )
 
     def _rows(self, status: str) -> Iterator[dict[str, Any]]:
-        for k in range(len(self._open)):
-            columns = "key, spec, faults, row"
-            for _, key, *texts in self._chosen(k, columns, status):
+        for file in self._files:
+            for key, *texts in file.cells("key, spec, faults, row", status):
                 try:
                     yield _parsed_row(key, status, *texts)
                 except (ValueError, TypeError, KeyError, RecursionError) as error:
                     raise self.damaged_row(str(key), error) from None
 
-    def _chosen(self, k: int, columns: str, status: str) -> Iterator[Any]:
-        """Yield the rowid and columns of the cells of a file that count."""
-        counted = self._counted[k, status]
-        for row in self._query(k, f"SELECT rowid, {columns} {OF}", status):
-            # a driver may have finished others since the ledger was opened
-            if _is_in(row[0], counted):
-                yield row
 
-    def _query(self, k: int, query: str, *values: Any) -> Iterator[Any]:
-        file, database = self._open[k]
+class _File:
+    """A file of a ledger, open for reading.
+
+    Attributes:
+        path: The file.
+        counted: By status, the rowids of the cells that count, rising. Keys of a
+            million cells would take much memory.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.counted = {status: array("q") for status in STATUSES}
+        self._database = _reader(path)
+
+    def close(self) -> None:
+        self._database.close()
+
+    def query(self, query: str, *values: Any) -> Iterator[Any]:
+        """Yield the rows of a query. Raises InputError if the file cannot be read."""
         try:
-            yield from database.execute(query, values)
+            yield from self._database.execute(query, values)
         except (sqlite3.Error, UnicodeDecodeError) as error:
-            raise unusable(file, error) from None
+            raise unusable(self.path, error) from None
+
+    def cells(self, columns: str, status: str) -> Iterator[Any]:
+        """Yield columns of the cells that count."""
+        for rowid, *values in self.query(f"SELECT rowid, {columns} {OF}", status):
+            # a driver may have finished others since the ledger was opened
+            if _is_in(rowid, self.counted[status]):
+                yield values
+
+    def counts(self, key: str) -> bool:
+        """Return whether the cell with this key counts."""
+        query = "SELECT rowid, status FROM cells WHERE key = ?"
+        for rowid, status in self.query(query, key):
+            if _is_in(rowid, self.counted.get(status, [])):
+                return True
+        return False
 
 
 def _is_in(rowid: int, rising: Sequence[int]) -> bool:
@@ -232,7 +247,7 @@ def _parsed_row(
     return {**parsed, "reasons": list(map(str, json.loads(faults)))}
 
 
-def _files(path: Path) -> list[Path]:
+def _names(path: Path) -> list[Path]:
     """Return the path if it is a file, or all ledgers in a folder."""
     if path.is_file():
         return [path]

@@ -160,45 +160,24 @@ def _tracks(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
     _check_names("a plan", tables, TABLES)
     defaults = _mapping("defaults", tables.get("defaults", {}))
     _check_names("defaults", defaults, FIELDS)
+    shared = flattened("defaults.settings", defaults.get("settings", {}))
     listed = tables.get("cells", [])
     if not isinstance(listed, list | tuple):
         raise InputError(f"cells must be a list of tables, got {quoted(listed)}")
     single = [_mapping("cells", spec) for spec in listed]
-    crossed = _mapping("product", tables.get("product") or {})
-    _check_names("product", crossed, [*LISTS, *PARTS])
-    if any(part in crossed for part in PARTS):
-        crossed = _with_methods(crossed)
-    lists = {}
-    for name, values in crossed.items():
-        lists[LISTS[name]] = _listed(f"product.{name}", LISTS[name], values)
-    _check_fields(lists)
-    if "methods" in crossed:
-        # A product varies its last list fastest. With the methods last, an unfinished
-        # sweep has all methods on the cases that are done.
-        lists["method"] = _gridded(
-            lists.pop("method"), tables.get("grid", {}), families
-        )
-    elif "grid" in tables:
-        raise InputError("grid must come with the methods of a product, got none")
-    shared = flattened("defaults.settings", defaults.get("settings", {}))
-    used: set[str] = set()
-
-    def make(spec: Entry) -> Cell:
-        """Return a cell, with the shared settings that its method has."""
-        method = spec.get("method", defaults.get("method"))
-        names: Sequence[str] = ()
-        if shared and isinstance(method, str):
-            names = families(method)
-        applicable = {}
-        for name, value in shared.items():
-            if name.partition(".")[0] in names:
-                applicable[name] = value
-        used.update(applicable)
-        settings = applicable | flattened("settings", spec.get("settings", {}))
-        return cell_of({**defaults, **spec, "settings": settings})
+    lists = _track_lists(tables)
 
     def cells() -> Iterator[Cell]:
-        yield from map(make, chain(_product(lists), single))
+        used: set[str] = set()
+        for spec in chain(_product(lists), single):
+            method = spec.get("method", defaults.get("method"))
+            # a method gets those of the shared settings that it has
+            settings = {}
+            if shared and isinstance(method, str):
+                settings = _of_families(shared, families(method))
+            used.update(settings)
+            settings |= flattened("settings", spec.get("settings", {}))
+            yield cell_of({**defaults, **spec, "settings": settings})
         for name in shared:
             if name not in used:
                 raise InputError(
@@ -206,8 +185,39 @@ def _tracks(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
                     f"got {quoted(name)}, which none uses"
                 )
 
-    _check_count(lists)
     return cells
+
+
+def _track_lists(tables: Mapping[str, Any]) -> dict[str, Sequence[Any]]:
+    """Return the entries of a product's lists by their fields, methods last.
+
+    A product varies its last list fastest. So an unfinished sweep has all methods on
+    the cases that are done.
+    """
+    crossed = _mapping("product", tables.get("product") or {})
+    _check_names("product", crossed, [*LISTS, *PARTS])
+    if any(part in crossed for part in PARTS):
+        crossed = _with_methods(crossed)
+    lists: dict[str, Sequence[Any]] = {}
+    for name, values in crossed.items():
+        lists[LISTS[name]] = _listed(f"product.{name}", LISTS[name], values)
+    _check_fields(lists)
+    if "methods" in crossed:
+        methods = lists.pop("method")
+        lists["method"] = _gridded(methods, tables.get("grid", {}), families)
+    elif "grid" in tables:
+        raise InputError("grid must come with the methods of a product, got none")
+    _check_count(lists)
+    return lists
+
+
+def _of_families(settings: Mapping[str, Any], names: Sequence[str]) -> dict[str, Any]:
+    """Return those of some settings, NAME.SETTING, that begin with one of the NAMEs."""
+    chosen = {}
+    for setting, value in settings.items():
+        if setting.partition(".")[0] in names:
+            chosen[setting] = value
+    return chosen
 
 
 def _with_methods(crossed: Mapping[str, Any]) -> dict[str, Any]:
@@ -344,14 +354,7 @@ def _gridded(
     Returns:
         The entries, each with its settings.
     """
-    lists: dict[str, Any] = {}
-    if isinstance(grid, Mapping):
-        lists = flattened("grid", grid)
-    if (grid and not lists) or not isinstance(grid, Mapping):
-        raise InputError(f"grid must hold {GRID}, got {quoted(grid)}")
-    for name, values in lists.items():
-        if "." not in name or not isinstance(values, list | tuple) or not values:
-            raise InputError(f"grid must hold {GRID}, got {name} = {quoted(values)}")
+    lists = _grid_lists(grid)
     entries = []
     used = set[str]()
     known = set[str]()
@@ -361,7 +364,8 @@ def _gridded(
         if lists and isinstance(method, str):
             names = names_of(method)
         known.update(names)
-        applicable = [name for name in lists if name.partition(".")[0] in names]
+        applicable = _of_families(lists, names)
+        used.update(applicable)
         entry_settings = flattened("settings", entry.get("settings", {}))
         for name in applicable:
             # an entry may name its settings with or without the method's name
@@ -370,10 +374,12 @@ def _gridded(
                     "grid must hold settings that no entry of methods sets itself, "
                     f"got {name}, which one sets"
                 )
-        used.update(applicable)
-        for chosen in product(*(lists[name] for name in applicable)):
+        if not applicable:
+            entries.append(entry)
+            continue
+        for chosen in product(*applicable.values()):
             settings = entry_settings | dict(zip(applicable, chosen, strict=True))
-            entries.append({**entry, "settings": settings} if applicable else entry)
+            entries.append({**entry, "settings": settings})
     for name in lists:
         if name not in used:
             raise InputError(
@@ -381,6 +387,17 @@ def _gridded(
                 f"methods, got {quoted(name)}"
             )
     return entries
+
+
+def _grid_lists(grid: Any) -> dict[str, Any]:
+    """Return the values of each setting of a grid by its name NAME.SETTING."""
+    lists = flattened("grid", grid) if isinstance(grid, Mapping) else {}
+    if not isinstance(grid, Mapping) or (grid and not lists):
+        raise InputError(f"grid must hold {GRID}, got {quoted(grid)}")
+    for name, values in lists.items():
+        if "." not in name or not isinstance(values, list | tuple) or not values:
+            raise InputError(f"grid must hold {GRID}, got {name} = {quoted(values)}")
+    return lists
 
 
 def _check_names(

@@ -9,14 +9,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from itertools import islice
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from posefit.errors import InputError
 from posefit.reading import cut
 from posefit.settings import settings_text
 from posefit.sweep.cell import Cell, TrackCell, foreign_plugins, json_of, run_cell
-from posefit.sweep.command import cells_of, done_in, file_of, shards_in
+from posefit.sweep.command import cells_of, done_in, file_of, ledgers_of
 from posefit.sweep.engine import POLL_SECONDS, Limits, Outcome
 from posefit.sweep.plan import Plan
 from posefit.sweep.pool import Pool
@@ -88,13 +87,10 @@ def _cells(
     plan: str, out: str | None, shard: str | None
 ) -> Iterator[tuple[Cell, bool]]:
     """Yield the cells of a plan or of a shard, each with whether it is done."""
-    name = file_of(shard)
+    ledgers = ledgers_of(out, shard) if out is not None else []
+    # a wrong shard is reported before the plan is read, which may take seconds
+    file_of(shard)
     cells = cells_of(Plan.read(plan), shard)
-    ledgers = []
-    if out is not None:
-        ledgers.append(Path(out) / name)
-        if shard is None:
-            ledgers += shards_in(Path(out))
     done = done_in(ledgers)
     yield from ((cell, cell.key in done) for cell in cells)
 

@@ -10,11 +10,13 @@ from posefit.errors import InputError
 from posefit.progress import interactive
 from posefit.reading import counted, cut, quoted
 from posefit.settings import setting_text
+from posefit.sweep.cell import run_cell
 from posefit.sweep.check import FIELDS
-from posefit.sweep.command import engine, swept
+from posefit.sweep.command import swept
 from posefit.sweep.engine import Limits
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
+from posefit.sweep.pool import Pool
 from posefit.sweep.table import flat
 
 TIMES = ("seconds", "seconds_per_frame", "cpu_seconds_per_frame")
@@ -48,8 +50,8 @@ def rerun(ledger: str | Path, key: str, out: str | Path | None = None) -> list[s
     plan = Plan.of(plan_tables(earlier["spec"]))
     with TemporaryDirectory(prefix="posefit-") as temporary:
         folder = Path(temporary) / "rerun" if out is None else Path(out)
-        start = engine(Limits(), workers=1)
-        tally = swept(plan, folder, start(), interactive().log, quiet=True)
+        pool = Pool(1, Limits(), run_cell)
+        tally = swept(plan, folder, pool, interactive().log, quiet=True)
         if tally.stopped:
             raise KeyboardInterrupt
         # otherwise the earlier row would be compared with itself

@@ -31,12 +31,19 @@ from numpy.random import mtrand
 
 from posefit.errors import PluginWarning
 from posefit.limits import end_with_parent, memory
-from posefit.sweep.engine import Limits, Outcome, Run, single_thread, text_of
+from posefit.sweep.engine import Limits, Outcome, Run, text_of
 
 MARK = "POSEFIT_WORKER"  # the environment variable of a process' mark
 STARTED = b""  # a worker sends this once, when it can take jobs
 START_SECONDS = 600.0  # the longest that a process takes to start
 END_SECONDS = 1.0  # the longest that a process without a connection takes to end
+# environment variables with the number of threads of libraries
+THREADS = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+)
 _starting = threading.Lock()
 # all signals but the two that no process can handle
 _SIGNALS = sorted(
@@ -309,6 +316,22 @@ def become_worker(parent: int, path: list[str]) -> None:
     warnings.simplefilter("ignore", PluginWarning)
     single_thread()
     end_with_parent(parent, partial(_end_marked, os.environ[MARK]))
+
+
+def single_thread() -> None:
+    """Limit each library of this process to one thread, as cells run side by side."""
+    # these libraries read the variables when they are loaded
+    os.environ.update(dict.fromkeys(THREADS, "1"))
+    # numba, once loaded, raises an error at its next compilation if the number changed
+    if "numba" not in sys.modules:
+        os.environ["NUMBA_NUM_THREADS"] = "1"
+    import cv2
+    import numba
+    from threadpoolctl import threadpool_limits
+
+    cv2.setNumThreads(1)
+    numba.set_num_threads(1)
+    threadpool_limits(1)
 
 
 def _serve(

@@ -160,7 +160,7 @@ def test_failures_and_instances_left_out_are_named_above_the_leaderboard(
     ]
     assert (
         " ".join(lines[first + 5].split())
-        == "error with losses 95 % interval behind p lost in lost % skill"
+        == "error with losses ° 95 % interval behind ° p lost in lost % skill"
     )
 
 
@@ -193,6 +193,18 @@ def test_figures_tables_and_rows_on_demand(results: Path, tmp_path: Path) -> Non
     assert sorted(row["status"] for row in csv_rows(rows)) == ["done"] * 8 + [
         "quarantined"
     ]
+
+
+def test_the_csv_has_the_rows_of_the_methods_that_are_compared(
+    tmp_path: Path,
+) -> None:
+    made = [result(replace(FIRST, method=m, seed=s), 1.0) for m in "ab" for s in (0, 1)]
+    failed = [(replace(FIRST, method=m, seed=2), ["it had to"]) for m in "ac"]
+    rows = tmp_path / "rows.csv"
+    path = ledger(tmp_path / "results", made, failed)
+    for names, methods in (("b", "bb"), ("a,c", "aaac")):
+        written(path, "--csv", rows, "--methods", names)
+        assert sorted(row["method"] for row in csv_rows(rows)) == list(methods)
 
 
 def test_methods_with_an_uncertainty_have_figures_of_it(tmp_path: Path) -> None:
@@ -304,7 +316,7 @@ def test_every_option_replaces_the_files_of_an_earlier_report(
     before = [path.read_bytes() for path in tables]
     places["--csv"].write_text("key,version,status,of another day")
     written(results, *words, "--methods", "sapso@pca")
-    assert len(csv_rows(places["--csv"])) == 9
+    assert len(csv_rows(places["--csv"])) == 4
     for path, earlier in zip(tables, before, strict=True):
         assert b"random@pca" in earlier
         assert b"random@pca" not in path.read_bytes()

@@ -163,7 +163,7 @@ os.environ["NUMBA_NUM_THREADS"] = "2"
 import numba
 from tests.sweep.fake import compiled
 compiled()
-from posefit.sweep.engine import single_thread
+from posefit.sweep.worker import single_thread
 single_thread()
 assert os.environ["NUMBA_NUM_THREADS"] == "2", os.environ["NUMBA_NUM_THREADS"]
 assert compiled() == 1
