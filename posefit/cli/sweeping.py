@@ -88,7 +88,9 @@ def sweep(
 @click.argument("ledger", metavar="DIR...", nargs=-1, required=True)
 @click.option("--out", metavar="FILE.html", help="The page.")
 @click.option(
-    "--csv", metavar="FILE", help="Write all rows of these methods to this file."
+    "--csv",
+    metavar="FILE",
+    help="Write all rows, or those of --methods, to this file.",
 )
 @click.option(
     "--figures",

@@ -1,7 +1,7 @@
 """Reads the finished rows of a ledger into arrays, which hold a million."""
 
 from array import array
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -136,23 +136,17 @@ def runs_of(
     label_of = _labels(rows, latest)
     chosen = _named(methods, label_of, rows) if methods else list(label_of)
     table = rows.finished
-    method_of_row = np.array(table.method, dtype=np.int64)
-    having_rows = set(np.unique(method_of_row).tolist())
-    finished = [m for m in chosen if m in having_rows]
+    seeds = list(table.seeds)
+
+    def place_key(place: int) -> tuple[Any, ...]:
+        return kind.rank(rows.places[place]), json_of(rows.places[place])
 
     # the rows of these methods, sorted by instance, method and seed
-    numbers = np.flatnonzero(np.isin(method_of_row, finished))
-    place_of_row = np.array(table.place, dtype=np.int64)[numbers]
-    seed_of_row = np.array(table.seed, dtype=np.int64)[numbers]
-    place_order = sorted(
-        np.unique(place_of_row).tolist(),
-        key=lambda i: (kind.rank(rows.places[i]), json_of(rows.places[i])),
-    )
-    seeds = list(table.seeds)
-    seed_order = sorted(np.unique(seed_of_row).tolist(), key=seeds.__getitem__)
-    instance = _ranks(place_of_row, place_order)
-    method = _ranks(method_of_row[numbers], finished)
-    seed = _ranks(seed_of_row, seed_order)
+    method_of_row = np.array(table.method, dtype=np.int64)
+    numbers = np.flatnonzero(np.isin(method_of_row, chosen))
+    finished, method = _ranked(method_of_row[numbers], chosen.index)
+    place_order, instance = _ranked(np.array(table.place)[numbers], place_key)
+    seed_order, seed = _ranked(np.array(table.seed)[numbers], seeds.__getitem__)
     order = np.lexsort((seed, method, instance))
     numbers = numbers[order]
 
@@ -198,11 +192,23 @@ def is_of(runs: Runs, spec: Mapping[str, Any]) -> bool:
     return json_of(_variant(spec)) in runs.chosen
 
 
-def _ranks(values: "NDArray[np.int64]", order: Sequence[int]) -> Array:
-    """Return the places of values (n,) in an order of all that occur."""
-    rank = np.zeros(max(order, default=-1) + 1, dtype=np.int64)
-    rank[order] = np.arange(len(order))
-    return np.asarray(rank[values])
+def _ranked(
+    values: "NDArray[np.int64]", key: Callable[[int], Any]
+) -> tuple[list[int], Array]:
+    """Return the distinct values in the order of a key, and each value's place there.
+
+    Args:
+        values: Whole numbers (n,).
+        key: Returns the key of a value.
+
+    Returns:
+        The distinct values, and the places (n,).
+    """
+    distinct_values, number = np.unique(values, return_inverse=True)
+    ordered = sorted(distinct_values.tolist(), key=key)
+    rank = np.empty(len(ordered), dtype=np.int64)
+    rank[np.searchsorted(distinct_values, ordered)] = np.arange(len(ordered))
+    return ordered, np.asarray(rank[number])
 
 
 def _read(ledger: "Ledger") -> _Rows:

@@ -7,7 +7,7 @@ import hashlib
 import json
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -93,8 +93,8 @@ class Cell:
 class TrackCell(Cell):
     """The tracking of one motion by one method.
 
-    A field with the name of an option of `posefit.tracking.options.TrackOptions` is
-    that option.
+    `posefit.tracking.options.TrackOptions` describes method, settings, evaluations,
+    translation, first_pose, hypotheses and seed, too.
 
     Attributes:
         method: `OPTIMISER@PRIOR`, or the name of a tracker.
@@ -168,7 +168,6 @@ class TrackCell(Cell):
         """
         from posefit.evaluation.errors import anytime_trace, mode_reliability
         from posefit.evaluation.measures import MEASURES
-        from posefit.footage.options import SourceOptions
         from posefit.geometry.skeleton import joint_distances
         from posefit.motion.clips import training_clips, training_motions
         from posefit.tracking.defaults import completed
@@ -184,16 +183,16 @@ class TrackCell(Cell):
         scene = cell_scene(self)
         clips = training_clips(self.train, followed=self.motion)
         training = training_motions(clips, scene.fps)
-        # the scene has the views already, and the training motions are loaded
-        option_names = {field.name for field in fields(TrackOptions)}
-        option_names -= {each.name for each in fields(SourceOptions)} | {"train"}
-        values = {}
-        for each in fields(self):
-            if each.name in option_names:
-                values[each.name] = getattr(self, each.name)
-        values["settings"] = settings_text(self.settings)
-        values["threads"] = 1  # cells run side by side
-        options = TrackOptions(**values)
+        options = TrackOptions(
+            method=self.method,
+            settings=settings_text(self.settings),
+            evaluations=self.evaluations,
+            translation=self.translation,  # type: ignore[arg-type]
+            first_pose=self.first_pose,  # type: ignore[arg-type]
+            hypotheses=self.hypotheses,
+            seed=self.seed,
+            threads=1,  # cells run side by side
+        )
         result = track_scene(scene, training, completed(options, self.motion))
         assert result.truth is not None
         truth = result.truth.joints
