@@ -19,10 +19,26 @@ from posefit.statistics.profiles import attained, hits
 from posefit.suites.functions import suite_function
 from posefit.suites.problem import TARGETS
 from posefit.suites.running import ALL, SHOWN, SuiteRun, suite_scores
-from posefit.sweep.table import search_run
 
 RANDOM = "random"  # the baseline method
 POINTS = 61  # of a curve
+
+
+def search_run(row: Mapping[str, Any]) -> SuiteRun:
+    """Return the suite run that a ledger's row of a single search describes."""
+    spec = row["spec"]
+    trace = row["trace"]
+    problem = dict(spec)
+    for name in ("kind", "name", "evaluations", "version"):
+        problem.pop(name, None)
+    return SuiteRun(
+        **problem,
+        budget=spec["evaluations"],
+        truth_cost=row["truth_cost"],
+        targets=row["truth_cost"] + TARGETS,
+        evaluations=np.array(trace["evaluations"], dtype=np.float64),
+        costs=np.array(trace["cost"], dtype=np.float64),
+    )
 
 
 def _hits(run: SuiteRun) -> Array:

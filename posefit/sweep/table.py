@@ -1,4 +1,4 @@
-"""The rows of a ledger as a pandas table, as a CSV file, or as runs of a suite.
+"""The rows of a ledger as a pandas table, or as a CSV file.
 
 `Ledger.frame` returns the pandas table, with one row per cell. Its columns are:
 
@@ -19,14 +19,10 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from posefit.errors import InputError
 from posefit.geometry.skeleton import JOINTS
 from posefit.measuring.tables import import_pandas
 from posefit.settings import settings_text
-from posefit.suites.problem import TARGETS
-from posefit.suites.running import SuiteRun
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -158,20 +154,3 @@ def _inert(value: Any) -> Any:
     if isinstance(value, str) and value.startswith(FORMULA_SIGNS):
         return f"'{value}"
     return value
-
-
-def search_run(row: Mapping[str, Any]) -> SuiteRun:
-    """Return the suite run that a ledger's row of a single search describes."""
-    spec = row["spec"]
-    trace = row["trace"]
-    problem = dict(spec)
-    for name in ("kind", "name", "evaluations", "version"):
-        problem.pop(name, None)
-    return SuiteRun(
-        **problem,
-        budget=spec["evaluations"],
-        truth_cost=row["truth_cost"],
-        targets=row["truth_cost"] + TARGETS,
-        evaluations=np.array(trace["evaluations"], dtype=np.float64),
-        costs=np.array(trace["cost"], dtype=np.float64),
-    )

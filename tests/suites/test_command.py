@@ -11,6 +11,7 @@ import pytest
 
 import posefit
 from posefit.errors import InputError
+from posefit.report.searches import search_run
 from posefit.suites.functions import SUITE
 from posefit.suites.registry import suite_registry
 from posefit.suites.running import run_of, run_on, suite_scores
@@ -18,7 +19,6 @@ from posefit.sweep.cell import run_cell
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
 from posefit.sweep.schema import FILE
-from posefit.sweep.table import search_run
 from posefit.sweep.writer import Writer
 from tests.cases import each
 from tests.commands import error_of, printed, run

@@ -26,7 +26,8 @@ from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
 from posefit.sweep.pool import Pool
 from posefit.sweep.schema import FILE
-from posefit.sweep.worker import _Process, become_worker
+from posefit.sweep.serve import become_worker
+from posefit.sweep.worker import _Process
 from posefit.sweep.writer import ATTEMPTS, Writer
 from posefit.version import posefit_build
 from tests.cases import each
@@ -163,7 +164,7 @@ os.environ["NUMBA_NUM_THREADS"] = "2"
 import numba
 from tests.sweep.fake import compiled
 compiled()
-from posefit.sweep.worker import single_thread
+from posefit.sweep.serve import single_thread
 single_thread()
 assert os.environ["NUMBA_NUM_THREADS"] == "2", os.environ["NUMBA_NUM_THREADS"]
 assert compiled() == 1
