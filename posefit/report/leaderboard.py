@@ -2,38 +2,20 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from posefit.report.contest import Baseline, Contest, Runs, contest_of
-from posefit.statistics.paired import SIGNIFICANCE
+from posefit.statistics.paired import SIGNIFICANCE, PairedTest
 
-
-@dataclass(frozen=True, kw_only=True)
-class Effect:
-    """How far a method is behind the first one.
-
-    Attributes:
-        behind: The mean difference in paired runs, above 0 if the method is worse.
-        behind_low: The lower end of its interval, nan if there are too few runs.
-        behind_high: The upper end.
-        p: Of the paired test, after Holm's correction.
-        blocks_needed: How many paired runs would show such a difference.
-    """
-
-    behind: float
-    behind_low: float
-    behind_high: float
-    p: float
-    blocks_needed: float
-
-    @property
-    def is_zero(self) -> bool:
-        """Whether the methods are equal in all runs."""
-        return self.behind_low == self.behind_high == 0.0
-
-
-EFFECT = tuple(field.name for field in fields(Effect))
+# the fields of a `PairedTest` by their names in rows of the leaderboard
+EFFECT = {
+    "behind": "difference",
+    "behind_low": "low",
+    "behind_high": "high",
+    "p": "adjusted",
+    "blocks_needed": "blocks_needed",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,8 +33,8 @@ class Standing:
         figures: The average of each figure by name, None if it is unknown.
         interval: The ends of the score's 95 % interval, or None.
         lost_tracks: The number of its runs that lost frames; None for searches.
-        effect: Its distance from the first method. None for the first one, and without
-            a test.
+        test: The paired test against the first method, whose difference is above 0 if
+            this method is worse. None for the first one, and for untested ones.
     """
 
     method: int
@@ -65,18 +47,20 @@ class Standing:
     figures: Mapping[str, float | None]
     interval: tuple[float, float] | None
     lost_tracks: int | None
-    effect: Effect | None = None
+    test: PairedTest | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """Return everything by name, figures and parts of the effect as well."""
+        """Return everything by name, figures and parts of the test as well."""
         values = dict(vars(self))
         figures = values.pop("figures")
-        effect = values.pop("effect")
+        test = values.pop("test")
         values["low"], values["high"] = values.pop("interval") or (None, None)
         if self.lost_tracks is None:
             del values["lost_tracks"]
-        effects = vars(effect) if effect else dict.fromkeys(EFFECT)
-        return {**values, **figures, **effects}
+        values |= figures
+        for name, field in EFFECT.items():
+            values[name] = getattr(test, field) if test else None
+        return values
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,8 +110,8 @@ def leaderboard(contest: Contest) -> list[Standing]:
         )
         rows.append(row)
     best_first = _best_first(contest, rows)
-    effects = _effects(contest, best_first[0].method)
-    return [replace(row, effect=effects.get(row.method)) for row in best_first]
+    tests = dict(contest.tests_against(best_first[0].method))
+    return [replace(row, test=tests.get(row.method)) for row in best_first]
 
 
 def _interval(contest: Contest, method: int) -> tuple[float, float] | None:
@@ -169,17 +153,3 @@ def _best_first(contest: Contest, rows: Sequence[Standing]) -> list[Standing]:
         return 1, row.lost_tracks or 0, badness(row)
 
     return sorted(rows, key=order)
-
-
-def _effects(contest: Contest, first: int) -> dict[int, Effect]:
-    """Return each tested method's distance from the first one."""
-    effects = {}
-    for m, test in contest.tests_against(first):
-        effects[m] = Effect(
-            behind=test.difference,
-            behind_low=test.low,
-            behind_high=test.high,
-            p=test.adjusted,
-            blocks_needed=test.blocks_needed,
-        )
-    return effects

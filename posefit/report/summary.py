@@ -7,13 +7,18 @@ from posefit.errors import printable
 from posefit.reading import counted
 from posefit.report.columns import listed, p_text
 from posefit.report.contest import Contest
-from posefit.report.leaderboard import Effect, Standing, Standings
-from posefit.statistics.paired import POWER, SIGNIFICANCE, fewest_blocks
+from posefit.report.leaderboard import Standing, Standings
+from posefit.statistics.paired import (
+    POWER,
+    SIGNIFICANCE,
+    PairedTest,
+    fewest_blocks,
+)
 
 # If a difference would take more seeds or instances, the methods are practically equal.
 MAX_NEEDED = 1000
 
-Tested = tuple[Standing, Effect]  # a method that was tested against the first one
+Tested = tuple[Standing, PairedTest]  # a method that was tested against the first one
 
 
 def leader_sentences(standings: Standings) -> list[str]:
@@ -27,11 +32,11 @@ def leader_sentences(standings: Standings) -> list[str]:
     contest = standings.contest
     kind = contest.runs.kind
     first, *others = (row for row in standings.board if row.taking_part)
-    tested = [(row, row.effect) for row in others if row.effect]
-    shown = [pair for pair in tested if pair[1].p < SIGNIFICANCE]
-    unclear = [pair for pair in tested if pair[1].p >= SIGNIFICANCE]
-    worse = [pair for pair in shown if pair[1].behind > 0.0]
-    better = [pair for pair in shown if pair[1].behind <= 0.0]
+    tested = [(row, row.test) for row in others if row.test]
+    shown = [pair for pair in tested if pair[1].adjusted < SIGNIFICANCE]
+    unclear = [pair for pair in tested if pair[1].adjusted >= SIGNIFICANCE]
+    worse = [pair for pair in shown if pair[1].difference > 0.0]
+    better = [pair for pair in shown if pair[1].difference <= 0.0]
     where = f"{kind.place_words(contest)} with {contest.seed_words}"
     facts = f"{_value(contest, first)} on {where}"
     if worse:
@@ -75,35 +80,40 @@ def _value(contest: Contest, row: Standing) -> str:
 def _led(contest: Contest, worse: Sequence[Tested]) -> str:
     """Return the methods that are shown to be worse; the nearest has its difference."""
     score = contest.runs.kind.score
-    (nearest, effect), *more = sorted(worse, key=lambda pair: pair[1].behind)
-    low = score.amount(effect.behind_low)
-    high = score.amount(effect.behind_high)
+    (nearest, test), *more = sorted(worse, key=lambda pair: pair[1].difference)
+    low = score.amount(test.low)
+    high = score.amount(test.high)
     text = (
-        f"{nearest.name} by {score.amount(effect.behind)} "
-        f"({low} to {high}, {p_text(effect.p)})"
+        f"{nearest.name} by {score.amount(test.difference)} "
+        f"({low} to {high}, {p_text(test.adjusted)})"
     )
     if not more:
         return text
     names = listed([row.name for row, _ in more])
-    p = p_text(max(effect.p for _, effect in more))
+    p = p_text(max(test.adjusted for _, test in more))
     if len(more) > 1:
         p = p.replace("=", "at most")
     return f"{text}, and {names} by more ({p})"
 
 
-def _effect(contest: Contest, row: Standing, effect: Effect) -> str:
+def _effect(contest: Contest, row: Standing, test: PairedTest) -> str:
     """Return a method's name, difference from the first, interval, p and losses."""
     score = contest.runs.kind.score
-    if effect.is_zero:
+    if _is_zero(test):
         return f"{row.name} (equal in all {score.paired})"
-    details = [score.difference(effect.behind)]
-    if math.isfinite(effect.behind_low):
-        low = score.difference(effect.behind_low)
-        details.append(f"{low} to {score.difference(effect.behind_high)}")
-    details.append(p_text(effect.p))
+    details = [score.difference(test.difference)]
+    if math.isfinite(test.low):
+        low = score.difference(test.low)
+        details.append(f"{low} to {score.difference(test.high)}")
+    details.append(p_text(test.adjusted))
     if row.lost_tracks:
         details.append(f"lost in {row.lost_tracks} of {row.runs}")
     return f"{row.name} ({', '.join(details)})"
+
+
+def _is_zero(test: PairedTest) -> bool:
+    """Return whether the methods are equal in all runs."""
+    return test.low == test.high == 0.0
 
 
 def _power(contest: Contest, unclear: Sequence[Tested]) -> list[str]:
@@ -112,8 +122,8 @@ def _power(contest: Contest, unclear: Sequence[Tested]) -> list[str]:
     There is none about methods that are equal in all runs.
     """
     score = contest.runs.kind.score
-    nearest, effect = min(unclear, key=lambda pair: pair[1].blocks_needed)
-    needed = effect.blocks_needed
+    nearest, test = min(unclear, key=lambda pair: pair[1].blocks_needed)
+    needed = test.blocks_needed
     methods, blocks = contest.tested_errors.shape[:2]
     fewest = fewest_blocks(len(contest.comparisons))
     # the spread of so few runs says little, so nothing is computed from it
@@ -122,7 +132,7 @@ def _power(contest: Contest, unclear: Sequence[Tested]) -> list[str]:
             f"{blocks} paired {score.paired} cannot show a difference between "
             f"{methods} methods: that takes at least {fewest}."
         ]
-    if all(each.is_zero for _, each in unclear):
+    if all(_is_zero(each) for _, each in unclear):
         return []
     unit = "instances"
     if score.paired == "runs":

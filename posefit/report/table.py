@@ -32,10 +32,10 @@ def board_cells(score: Score, row: Standing) -> dict[str, str]:
         ends = " to ".join(map(number, row.interval))
     behind = "-"
     p = "-"
-    if row.effect:
-        behind = number(row.effect.behind)
-        p = number(row.effect.p, 3)
-        if row.effect.p < LEAST_P:
+    if row.test:
+        behind = number(row.test.difference)
+        p = number(row.test.adjusted, 3)
+        if row.test.adjusted < LEAST_P:
             p = f"< {LEAST_P}"
     cells = {
         score.column.title: number(row.figures[score.name]),

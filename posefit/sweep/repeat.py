@@ -61,8 +61,7 @@ def rerun(ledger: str | Path, key: str, out: str | Path | None = None) -> list[s
                 f"got {folder}, which has it"
             )
         (cell,) = plan
-        with Ledger(folder) as results:
-            now = next(row for row in results.all_rows() if row["key"] == cell.key)
+        now = _row_of(folder, cell.key)
     return _differences(earlier, now)
 
 
