@@ -68,7 +68,7 @@ class Pool:
     def wait(self, seconds: float) -> list[Outcome]:
         """Return the outcomes of the jobs that ended.
 
-        Returns after that many seconds, or earlier if a job begins or ends.
+        Returns after that many seconds, or earlier if a process starts or a job ends.
         """
         busy = [worker for worker in self._workers if worker.is_busy]
         connection.wait([worker.connection for worker in busy], seconds)
