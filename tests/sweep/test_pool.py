@@ -422,7 +422,7 @@ def test_a_lost_scheduler_leaves_all_rows_and_the_same_command_continues(
         ledger.plan(cells(10))
         with pytest.raises(
             ValueError,
-            match=r"127.*went away; \d+ of 10 cells are done and safe: run the same",
+            match=r"127.*got a lost connection; \d+ of 10 cells are done and safe: run the same",
         ):
             drive(ledger, engine, print, watch)
     assert swept(tmp_path / "results", cells(10), Pool(2, LIMITS, behave)).done == 10
