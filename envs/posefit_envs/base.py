@@ -428,8 +428,8 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         terminated = stepping & terminated
         truncated = stepping & (self.steps >= self._longest)
         self.ended = terminated | truncated
-        # a row has either the infos of its step, or those of the reset that came
-        # instead of it (NEXT_STEP) or after it (SAME_STEP)
+        # a row has the infos of its step, unless a reset came instead of it (NEXT_STEP)
+        # or after it (SAME_STEP): then it has the infos of the reset
         going = stepping
         begun_infos: Infos = self.reset_infos() if not stepping.all() else {}
         final: Infos = {}

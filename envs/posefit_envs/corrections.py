@@ -32,7 +32,7 @@ class Corrections(Wrapper):
     """A vector of FitImage-v1 in which actions correct the best proposal so far.
 
     Proposals of poses are hard to get right from a picture alone. A correction of a
-    proposal that is near the truth is easier, if its silhouette is seen beside the
+    proposal that is near the truth is easier, if its silhouette is shown with the
     observed one. This wrapper remembers the best proposal of each episode, shows where
     its silhouette differs, and adds the action to it.
 
@@ -159,7 +159,7 @@ def features(
 
     Args:
         observed: The observed silhouettes (n, p), shrunk.
-        drawn: Those of the best proposals (n, p); zeros before the first proposal.
+        drawn: The silhouettes of the best proposals (n, p); zeros before the first.
         best: The best proposals (n, d).
         first: Which rows (n,) have no proposal yet.
         failures: Corrections (n,) in vain.

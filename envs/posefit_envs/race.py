@@ -216,7 +216,7 @@ class Races:
             "instance": numbers.copy(),
         }
         if self.world.shows_truth:
-            # alignment would move the body and leave the pose as it is: align no row
+            # alignment would move the body without changing the pose: align no row
             no_rows = self.stage.all_rows[:0]
             poses, _ = self.stage.decode(problems.best[:, None], no_rows)
             poses = poses[:, 0]

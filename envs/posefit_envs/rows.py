@@ -64,8 +64,8 @@ class VectorRows:
         self.mode = AutoresetMode(vector.metadata["autoreset_mode"])
         self._vector: Any = DictInfoToList(vector)
         self._begun = False
-        # the observations and infos of the last step; rows that ended under SAME_STEP
-        # have those of their new episode
+        # the observations and infos of the last step; a row that ended under SAME_STEP
+        # already shows its new episode
         self.begun: tuple[Any, list[Infos]] = None, []
         # which rows of the last step were cut short
         self.truncated = np.zeros(self.count, dtype=bool)

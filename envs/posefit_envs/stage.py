@@ -321,7 +321,7 @@ class Stage:
     def decode(self, proposals: Array, rows: Rows) -> tuple[Array, Array]:
         """Return poses (n, k, 66) and translations (n, k, 3) of proposals (n, k, d).
 
-        With aligned translations, only those of `rows` are set.
+        Aligned translations are set only for `rows`.
         """
         n, k = proposals.shape[:2]
         columns = self._columns

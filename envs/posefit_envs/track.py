@@ -93,8 +93,8 @@ class TrackEnv(SearchEnv):
     A step and a reset give `cost`, `best_cost`, `evaluations` of the frame,
     `remaining_steps` of the episode, `areas` (views, 3), `frame`, and `instance`; and
     of the pose that the step commits `committed_frame`, `committed_cost` and
-    `committed_pose` (66,). A step that commits nothing has -1, infinity and zeros. The
-    `frame` of one that commits is the next frame.
+    `committed_pose` (66,). A step that commits nothing has -1, infinity and zeros.
+    After a step that commits, `frame` is the next frame.
 
     In training they also give `error_degrees` of the proposal,
     `committed_error_degrees` and `committed_mpjpe_mm`, unless `errors=False`; in the

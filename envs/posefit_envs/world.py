@@ -99,7 +99,7 @@ class World:
 
     @property
     def shows_truth(self) -> bool:
-        """Whether infos hold the truth: those of the test split only to evaluate."""
+        """Whether infos hold the truth: in the test split, only with `evaluate`."""
         return self.errors and (self.evaluate or self.split == "train")
 
     @cached_property
@@ -116,8 +116,8 @@ class World:
     def training(self) -> tuple[str, ...]:
         """The training motions: styles of the built-in motions, or of "walk".
 
-        With held-out people they are the styles of everybody else. Without, they are
-        the other styles than the one that is shown.
+        With held-out people they are the styles of everybody else; otherwise all styles
+        but the one that is shown.
         """
         if self.train:
             return self.train
@@ -494,7 +494,7 @@ def instance(
     if world.yaw == "unknown":
         yaw = azimuths[0]  # facing the camera
     fitted = varied(body, world.mismatch_percent, rng)
-    # drawn last, so that arguments leave the numbers above as they are
+    # drawn last, so that arguments do not change the random numbers above
     anchor = truth.translations[0].copy()
     if world.translation == "searched":
         anchor += rng.uniform(-MIDDLE_METRES, MIDDLE_METRES, 3)

@@ -50,8 +50,8 @@ TINY = 1e-9
 # Columns of a row of `cones`: centre and radius of the first disc; the direction to the
 # last disc's centre, and its distance; how much less the last radius is; the tangent of
 # the angle that the sides have with the axis; and 1 over the length of the bone, 0 if
-# one disc covers the other. They are what a distance needs: each cone gets many, and
-# divisions and roots take longest.
+# one disc covers the other. A distance needs these numbers: each cone gets many
+# distances, and divisions and roots take longest.
 X0, Y0, R0, AXIS_X, AXIS_Y, LENGTH, TAPER, TANGENT, INVERSE = range(9)
 CONE = 9  # columns
 # A bone has six numbers: the columns and rows of its first and its last disc, then both

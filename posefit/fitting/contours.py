@@ -161,9 +161,9 @@ class MaskContours:
 
 
 def coarseness(camera: Camera, places: Array) -> tuple[Array, int]:
-    """Return the pixels of a metre (T,) at places (T, 3), and which pixels are used.
+    """Return the pixels per metre (T,) at places (T, 3), and the spacing of those used.
 
-    Of a mask that is finer than needed, only every so many pixels are used.
+    A mask that is finer than needed is read at every second, third, ... pixel only.
     """
     far = np.maximum(camera.project(places)[1], 0.1)
     metres = np.sqrt(camera.focal.prod()) / far

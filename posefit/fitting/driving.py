@@ -70,8 +70,8 @@ def drive(
 ) -> Iterator[Frame]:
     """Yield a tracker's frame for each observation, with the time that it took.
 
-    Poses are counted as they are rasterised, see `posefit.silhouette.drawn`. Areas and
-    costs are computed again from the poses. A frame with right figures does not change.
+    Rasterised poses are counted, see `posefit.silhouette.drawn`. Areas and costs are
+    computed again from the poses; a frame with correct figures does not change.
 
     Args:
         make: Makes the tracker of a task.

@@ -70,8 +70,8 @@ class Filter(Optimiser, Protocol):
 # compared with: the kit of checks does not ask it to beat chance.
 OptimiserFactory = Callable[..., Optimiser]
 
-# The optimiser of the next frame: a new one that starts around the prediction, SAPSO
-# (6), (7); the same one, a `Filter`, with its particles; or a new one that starts
+# The optimiser of the next frame. "start": a new one around the prediction, SAPSO (6),
+# (7). "carry": the same `Filter` with its particles. "forget": a new one that starts
 # anywhere.
 NextFrame = Literal["start", "carry", "forget"]
 

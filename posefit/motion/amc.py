@@ -123,7 +123,7 @@ def read_amc(
 
 
 def doubtful_angles(angles: Array, *, radians: bool) -> str:
-    """Return what is doubtful about the unit of joints' angles, or "".
+    """Return a doubt about the unit of joints' angles, or "".
 
     Args:
         angles: The angles (T, n) as a file has them.

@@ -65,7 +65,7 @@ FRAME_TIMES = (1e-4, 10.0)  # seconds
 WHOLE_RATE = 1e-4
 # rates that programs write, whose frame times files round to a few digits
 USUAL_RATES = (
-    # whole ones, and those of NTSC
+    # whole rates, then NTSC rates
     (24, 25, 30, 48, 50, 60, 72, 90, 100, 120, 144, 150, 180, 200, 240, 250, 300),
     tuple(whole * 1000.0 / 1001.0 for whole in (24, 30, 60, 120, 240)),
 )

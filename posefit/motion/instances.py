@@ -4,7 +4,7 @@ An instance is a person, their pose or motion, and the cameras' views of it. A n
 means the same instance on every machine and in every version, provided that the other
 settings are the same. Numbers 0 to 9,999 are for training and tuning; 10,000 to 19,999
 are held out. The table lists, for each thing that is numbered, the other settings, and
-what the number decides.
+the choices that the number makes.
 
 | numbered | settings | decided by the number | stream |
 |---|---|---|---|

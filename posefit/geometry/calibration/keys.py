@@ -50,7 +50,7 @@ _HARMLESS = re.compile(
 )
 # keys of a matrix (3, 4); with two numbers, `p` describes a lens
 _PROJECTIONS = ("p", "projectionmatrix")
-# models of lenses that are no polynomial, as texts state them under whatever key
+# lens models without a polynomial, which texts may state under any key
 _MODEL = re.compile(
     r"(opencv|radial|simpleradial|thinprism)*(fisheye|equidistant|equisolid(angle)?"
     r"|stereographic|kannalabrandt|kb)[0-9]*|omni(directional)?|equirectangular"

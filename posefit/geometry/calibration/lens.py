@@ -57,7 +57,7 @@ class Calibration:
     fisheye: bool = False
     # whether +y is known to be up in the file's world, as in our own files
     upright: bool = False
-    # what is known of the unit of the translation
+    # how well the unit of the translation is known
     scale: Scale = "open"
 
     @property
@@ -95,7 +95,7 @@ class Calibration:
         """Return the calibration in metres.
 
         `metres` is the length of the file's unit. A calibration that is in metres
-        already, or that has no place, is returned as it is.
+        already, or that has no place, is returned unchanged.
         """
         if self.translation is None or self.scale == "metres":
             return self
@@ -237,7 +237,7 @@ def stated(
         fisheye: Whether the lens is OpenCV's fisheye.
         cropped: Whether the pictures show a part of the sensor, so that the principal
             point may be anywhere.
-        scale: What is known of the unit of `place`.
+        scale: How well the unit of `place` is known.
 
     Returns:
         The calibration.

@@ -98,7 +98,7 @@ def _moved(place: Place, rotation: Array, translation: Array, scale: float) -> P
 
 
 def _camera(name: str, sensor: Any, place: Place, scale: Any) -> Calibration:
-    # the initial one is what the adjusted one was found from
+    # the adjusted one was found from the initial one, and replaces it
     found = sensor.findall("calibration")
     adjusted = [each for each in found if each.get("class") != "initial"]
     if not found:
