@@ -34,7 +34,7 @@ from table import WORKERS, drawn_means, keyed, markdown, measured, quantiles
 HELD_OUT = 10_000  # the first instance of the test split
 INSTANCES = 200
 SEEDS = 5
-STEPS = 240_000
+STEPS = 1_000_000  # about five minutes of one core
 TESTED = list(range(HELD_OUT, HELD_OUT + INSTANCES))
 LEVELS = {
     "easy": "FitImage-easy-v1",
