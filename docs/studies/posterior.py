@@ -292,7 +292,7 @@ def _none(calibration: PosteriorCalibration, tracks: Sequence[TrackFeatures]) ->
     """
     signs = np.array(
         [
-            none_features(calibration.log(signs))
+            none_features(calibration.log_error(signs))
             for track in tracks
             for signs in track.evidence
         ]
@@ -356,9 +356,9 @@ def _spreads(
         rows = np.arange(0, len(features.track), EVERY)
         row_weights = weights[begin + rows]
         begin += len(track)
-        errors = np.exp([calibration.log(signs) for signs in features.evidence[rows]])[
-            :, None
-        ]
+        errors = np.exp(
+            [calibration.log_error(signs) for signs in features.evidence[rows]]
+        )[:, None]
         skeleton = track.skeleton
         true = skeleton.joints(track.truth[rows])
         off = np.array(
@@ -469,7 +469,9 @@ def radii_of(
     angles = []
     track = features.track
     for k in range(0, len(track), every):
-        recalibration = calibration.recalibration(calibration.log(features.evidence[k]))
+        recalibration = calibration.recalibration(
+            calibration.log_error(features.evidence[k])
+        )
         posterior = replace(track.posterior(k), recalibration=recalibration)
         joints.append(joint_intervals(track.skeleton, posterior, track.reported[k]))
         angles.append(angle_intervals(posterior, track.reported[k]))
@@ -534,7 +536,7 @@ class Evaluation:
 def evaluated(calibration: PosteriorCalibration, features: TrackFeatures) -> Evaluation:
     none = np.array(
         [
-            calibration.recalibration(calibration.log(signs)).none
+            calibration.recalibration(calibration.log_error(signs)).none
             for signs in features.evidence
         ]
     )

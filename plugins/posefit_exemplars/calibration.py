@@ -56,12 +56,12 @@ def evidence(
     )
 
 
-def none_features(log: float) -> Array:
+def none_features(log_error: float) -> Array:
     """Return the predictors (3,) of no mode being right.
 
     These are 1, the logarithm of the expected error, and the square of that logarithm.
     """
-    return np.array([1.0, log, log * log])
+    return np.array([1.0, log_error, log_error * log_error])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -77,14 +77,14 @@ class PosteriorCalibration:
     sharpness: float  # the power of modes' weights
     none: Array  # (3,) of the log-odds that no mode is right, over `none_features`
 
-    def log(self, evidence: Array) -> float:
+    def log_error(self, evidence: Array) -> float:
         """Return the logarithm of the expected error, from `evidence` (4,)."""
         return float(np.clip(self.slopes @ evidence, *self.range))
 
-    def recalibration(self, log: float) -> Recalibration:
+    def recalibration(self, log_error: float) -> Recalibration:
         """Return the recalibration of a frame with this logarithm of expected error."""
-        error = math.exp(log)  # metres
-        none = float(logistic(self.none @ none_features(log)))
+        error = math.exp(log_error)  # metres
+        none = float(logistic(self.none @ none_features(log_error)))
         return Recalibration(
             error * self.joint_spreads,
             error * self.angle_spreads,
@@ -130,9 +130,8 @@ def recalibrated(
     values = evidence(
         frame_costs.skeleton, posterior, pose, cost, frame_costs.camera_count
     )
-    return replace(
-        posterior, recalibration=calibration.recalibration(calibration.log(values))
-    )
+    recalibration = calibration.recalibration(calibration.log_error(values))
+    return replace(posterior, recalibration=recalibration)
 
 
 def reported(estimate: Estimate) -> Frame:

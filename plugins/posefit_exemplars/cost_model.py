@@ -293,7 +293,7 @@ class HypothesisCosts:
     def of_poses(
         self, frame_costs: FrameCosts, poses: Array, places: Array, noise: float
     ) -> tuple[Array, float]:
-        """Return what poses cost: their silhouettes, and their distance from the clips.
+        """Return the costs of poses by their silhouettes and distances from the clips.
 
         Args:
             frame_costs: The costs of the frame.
@@ -325,8 +325,8 @@ class HypothesisCosts:
     ) -> Array:
         """Return the costs (n, m) of steps to the m hypotheses of a frame.
 
-        The distances from where the motion of a hypothesis leads cost something: those
-        of its joints, and that of an unknown root.
+        A step costs the more, the farther the joints are from where the motion of the
+        hypothesis leads. The same holds for the root if it is unknown.
         """
         costs = motion_step_costs(self._spread, before, after)
         if frame_costs.root is None:
@@ -378,7 +378,12 @@ def _flat(vectors: Array) -> Codes:
 
 
 class MaskNoise:
-    """How precise the masks of one camera are, judged by the best frames so far."""
+    """How precise the masks of one camera are, judged by the best frames so far.
+
+    Args:
+        fps: Frames a second.
+
+    """
 
     def __init__(self, fps: float) -> None:
         # the costs of the best hypotheses of the latest frames
@@ -392,11 +397,11 @@ class MaskNoise:
     def of(
         self, frame_costs: FrameCosts, poses: Array, places: Array
     ) -> tuple[float, float]:
-        """Return the noise of the masks, and the evaluations that this took.
+        """Return the noise of a frame's masks, and the evaluations that this took.
 
-        The noise tells how many times less precise the masks of one camera are than
-        clean masks. It is 1 with several cameras. Before the first frame is fitted, the
-        costs of poses (n, 66) at places (n, 3) tell it.
+        The noise is how many times less precise the masks are than clean ones. It is 1
+        with several cameras. Before the first frame is fitted, it is estimated from the
+        costs of poses (n, 66) at places (n, 3).
         """
         if frame_costs.camera_count > 1:
             return 1.0, 0.0

@@ -22,7 +22,8 @@ from posefit.motion.motion import Motion
 from posefit_exemplars import kernels
 from posefit_exemplars.kernels import Codes, Rows
 
-# Metres: the least distance of two states of a clip, and of the centres of two groups.
+# Metres: the least distance between successive states of a clip, except to its last
+# frame, and between the centres of two groups.
 MIN_FRAME_DISTANCE = 0.02
 # Radians: directions that differ by less count as similar.
 SAME_TURN = np.radians(15.0)
@@ -100,7 +101,7 @@ class Tiles(NamedTuple):
     """
 
     codes: Codes  # (T, D, LANES)
-    states: Rows  # (T LANES,) the state of each code
+    states: Rows  # (T LANES,) the state of each slot: a lane of a tile
     starts: Rows  # (G + 1,) the first tile of each group
 
     @classmethod
@@ -109,13 +110,14 @@ class Tiles(NamedTuple):
         sizes = np.diff(starts)
         lanes = kernels.LANES
         tiles = np.append(0, np.cumsum(-(-sizes // lanes)))
-        places = np.arange(len(members)) + np.repeat(
-            lanes * tiles[:-1] - starts[:-1], sizes
-        )
+        # a group begins with a new tile, so that its members move up by the lanes that
+        # the groups before it leave empty
+        moved = np.repeat(lanes * tiles[:-1] - starts[:-1], sizes)
+        slots = np.arange(len(members)) + moved
         states = np.zeros(lanes * tiles[-1], np.int64)
         filled = np.full((len(states), codes.shape[1]), np.inf, codes.dtype)
-        states[places] = members
-        filled[places] = codes[members]
+        states[slots] = members
+        filled[slots] = codes[members]
         by_tile = filled.reshape(-1, lanes, codes.shape[1])  # (T, LANES, D)
         lanes_last = np.ascontiguousarray(by_tile.transpose(0, 2, 1))
         return cls(lanes_last, states, tiles)

@@ -135,7 +135,12 @@ class FrameFits:
         """Return poses fitted from where hypotheses of the frame before lead."""
         poses, places = start
         self.evaluations += len(poses) * continued_evaluations()
-        places = self._cheaper_places(poses, places)
+        if self._frame_costs.root is None:
+            places = self._cheaper_places(poses, places)
+        else:
+            # a known root leaves no choice, and saves two evaluations of each pose
+            places = self._frame_costs.at_root(places)
+            self.evaluations -= 2.0 * len(poses)
         means, pulls = self._pulls(poses)
         return fitted(
             self._task.body,
@@ -148,14 +153,8 @@ class FrameFits:
         )
 
     def _cheaper_places(self, poses: Array, places: Array) -> Array:
-        """Return the cheaper place (n, 3) of each pose: its own or the aligned one.
-
-        A known root leaves no choice, and saves two evaluations of each pose.
-        """
+        """Return the cheaper place (n, 3) of each pose: its own or the aligned one."""
         frame_costs = self._frame_costs
-        if frame_costs.root is not None:
-            self.evaluations -= 2.0 * len(poses)
-            return frame_costs.at_root(places)
         aligned = frame_costs.aligned(poses, places)
         cheaper = frame_costs.full(poses, aligned) < frame_costs.full(poses, places)
         return np.where(cheaper[:, None], aligned, places)

@@ -14,7 +14,7 @@ from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
 from posefit.silhouette.cost import known_views, pose_costs
 from posefit.silhouette.mask import Areas, coarser_camera, coarser_silhouette
 
-SIDE = 16  # pixels: a person is told apart in a picture with sides as long
+SIDE = 16  # pixels: sides of the smallest picture in which poses can be compared
 
 
 def small_factor(cameras: Sequence[Camera]) -> int:
@@ -31,13 +31,29 @@ class FrameCosts:
 
     Costs in the `small` picture are cheaper and coarser: it has every fourth pixel of
     every fourth row, or every second if it would be too small.
+
+    Args:
+        task: The task.
+        observation: The silhouettes and landmarks of the frame.
+        alone: Whether it is the only frame of a track.
+
+    Attributes:
+        camera_count: How many cameras show something of the person.
+        camera_position: (3,) metres, the position of the only one of these. None if
+            there are several, because they show depth, too.
+        root: (3,) metres, or None if the root is unknown.
+        small_share: The effort of a cost in the small picture, as a share of that of a
+            cost at full size.
+        usable: Whether the frame shows enough of the person.
+        yaw: About which way the person faces, radians, or None if it is unknown.
+
     """
 
     def __init__(
         self, task: Task, observation: Observation, alone: bool = False
     ) -> None:
         self._task = task
-        self.alone = alone  # the only frame of a track
+        self.alone = alone
         self.observation = observation
         silhouettes = observation.silhouettes
         factor = small_factor(task.cameras)
@@ -47,7 +63,6 @@ class FrameCosts:
         ]
         self._scene = (task.body, task.cameras, silhouettes)
         self._small_scene = (task.body, cameras, pictures)
-        # the effort of a cost in the small picture, as a share of a cost at full size
         self.small_share = 1.0 / factor**2
         # the cameras that show something of the person
         self._views = known_views(task.cameras, silhouettes)
@@ -56,9 +71,7 @@ class FrameCosts:
         self.yaw = observation.yaw
         self.usable = observation.usable
         known = observation.translation if task.translation == "known" else None
-        # (3,) metres, or None if the root is unknown
         self.root = None if known is None else np.asarray(known, dtype=np.float64)
-        # (3,) metres, or None if several cameras show the person: they also show depth
         self.camera_position: Array | None = None
         if self.camera_count == 1:
             self.camera_position = self._views[0].position
@@ -69,6 +82,7 @@ class FrameCosts:
         A known root gives the place. Otherwise it is the place near each of `places`
         (n, 3) at which the pose fits the silhouettes.
         """
+        # a frame of a known motion may lack its root: it then stays where it was
         if self.root is not None or self._task.translation == "known":
             return self.at_root(places)
         return align(*self._scene, poses, places, self._task.threads)

@@ -113,12 +113,12 @@ class Sources(NamedTuple):
     groups: Rows  # (n, g) the groups of poses that it can step to
 
 
-class Room(NamedTuple):
-    """Buffers with an entry for each place in the tiles."""
+class Buffers(NamedTuple):
+    """Arrays with an entry for each slot of the tiles: a lane of one of them."""
 
-    totals: Array  # infinite before and after a call
-    parents: Rows
-    reached: Rows
+    totals: Array  # the least total of each slot, infinite before and after a call
+    parents: Rows  # the row from which each slot is reached at that total
+    reached: Rows  # the slots that were reached, in that order
 
 
 class Bounds(NamedTuple):
@@ -151,7 +151,7 @@ def bound_of(bins, least, width, count, bound):
 
 
 @jit
-def cheapest_steps(sources, rows, tiles, room, bounds):
+def cheapest_steps(sources, rows, tiles, buffers, bounds):
     """Return the states that rows of a beam can step to, each with its cheapest step.
 
     A histogram of the totals so far shows which total the wanted states do not exceed.
@@ -162,7 +162,7 @@ def cheapest_steps(sources, rows, tiles, room, bounds):
         sources: The `Sources`.
         rows: The states that take a step.
         tiles: The codes of all states.
-        room: The `Room`.
+        buffers: The `Buffers`.
         bounds: The `Bounds`.
 
     Returns:
@@ -170,7 +170,7 @@ def cheapest_steps(sources, rows, tiles, room, bounds):
         the wanted states, and a few that cost a little more.
 
     """
-    best, parents, reached = room
+    best, parents, reached = buffers
     distances = np.empty(LANES, np.float32)
     partial = np.empty(LANES, np.float32)
     # as many bins as states in each, if the totals are evenly spread
@@ -194,24 +194,24 @@ def cheapest_steps(sources, rows, tiles, room, bounds):
                     if distances[lane] >= farthest:
                         continue
                     total = total_before + bounds.scale * distances[lane]
-                    place = LANES * t + lane
-                    if total >= best[place]:
+                    slot = LANES * t + lane
+                    if total >= best[slot]:
                         continue
-                    if best[place] == np.inf:
-                        reached[count] = place
+                    if best[slot] == np.inf:
+                        reached[count] = slot
                         count += 1
                     else:
-                        old = bin_of(best[place], bounds.least, width, len(bins))
+                        old = bin_of(best[slot], bounds.least, width, len(bins))
                         bins[old] -= 1
                     new = bin_of(total, bounds.least, width, len(bins))
                     bins[new] += 1
-                    best[place] = total
-                    parents[place] = row
+                    best[slot] = total
+                    parents[slot] = row
         bound = bound_of(bins, bounds.least, width, bounds.wanted, bound)
-    places = reached[:count]
-    wanted = places[best[places] <= bound]
+    slots = reached[:count]
+    wanted = slots[best[slots] <= bound]
     steps = tiles.states[wanted], parents[wanted], best[wanted]
-    best[places] = np.inf
+    best[slots] = np.inf
     return steps
 
 
@@ -227,19 +227,19 @@ def first_distinct(order, keys, kinds, share, count):
         count: How many rows are returned, at most.
 
     """
-    seen = np.zeros(keys.max() + 1, np.bool_)
-    counts = np.zeros(kinds.max() + 1, np.int64)
+    is_used = np.zeros(keys.max() + 1, np.bool_)  # of each key
+    of_kind = np.zeros(kinds.max() + 1, np.int64)  # rows chosen of each kind
     rows = np.empty(min(count, len(order)), np.int64)
-    found = 0
+    chosen = 0
     for row in order:
-        if found == len(rows):
+        if chosen == len(rows):
             break
-        if seen[keys[row]]:
+        if is_used[keys[row]]:
             continue
-        seen[keys[row]] = True
-        if counts[kinds[row]] == share:
+        is_used[keys[row]] = True
+        if of_kind[kinds[row]] == share:
             continue
-        counts[kinds[row]] += 1
-        rows[found] = row
-        found += 1
-    return rows[:found]
+        of_kind[kinds[row]] += 1
+        rows[chosen] = row
+        chosen += 1
+    return rows[:chosen]

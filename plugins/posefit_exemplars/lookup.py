@@ -254,13 +254,16 @@ class Lookup:
     def posterior(self, observation: Observation) -> Posterior | None:
         """Return the poses that a frame may show, with weights.
 
-        None if no pose has similar silhouettes.
+        None if no pose has similar silhouettes, or if the budget is too small to
+        compare even one.
         """
         if not observation.usable:
             return None
         known = self.task.yaw if observation.yaw is None else observation.yaw
         frame_costs = FrameCosts(self.task, observation)
         affordable = int(COSTS_SHARE * self.task.evaluations / frame_costs.small_share)
+        if affordable == 0:
+            return None
         nearest = self.nearest(observation, min(CANDIDATES, affordable), known)
         if nearest is None or nearest[2] > MAX_DISTANCE:
             return None

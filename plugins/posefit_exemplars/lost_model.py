@@ -26,7 +26,7 @@ from posefit.geometry.symmetry import facing
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import second_side
 
-# Decay time of the mean of the landmarks' evidence of sides.
+# Decay time of the sums of the landmarks' evidence of sides.
 MOMENT_SECONDS = 0.5
 # Landmarks of one camera tell left from right if the mean logarithm of their odds is at
 # least this.
@@ -167,28 +167,54 @@ def stored_classifier() -> FailureClassifier:
     return FailureClassifier.from_dict(json.loads(stored))
 
 
+class LandmarkSides:
+    """Whether left and right are known by landmarks, over the frames so far.
+
+    Args:
+        fps: Frames a second.
+        cameras: The number of cameras.
+
+    """
+
+    def __init__(self, fps: float, cameras: int) -> None:
+        self._decay = math.exp(-1.0 / (MOMENT_SECONDS * fps))
+        self._single = cameras == 1
+        # decaying sums of the log-odds of legs and of arms, and of frames
+        self._sums = np.zeros(3)
+
+    def known(self, odds: Array, by_model: bool) -> bool:
+        """Return whether left and right are known in the next frame.
+
+        Args:
+            odds: (2,) the logarithms of the odds that the frame's landmarks have legs
+                and arms on the sides of the pose.
+            by_model: Whether left and right are known by the model of exchanged sides.
+
+        """
+        self._sums = self._decay * self._sums + [*odds, 1.0]
+        legs, arms, count = self._sums
+        known = by_model
+        # landmarks of one camera are better evidence than its silhouettes
+        if self._single:
+            known = legs + arms >= MIN_SIDE_ODDS * count
+        # arms may be right where legs are exchanged, even if several cameras agree
+        return bool(known and legs >= 0.0)
+
+
 def with_failure_probabilities(
     frames: Iterable[Frame], task: Task, classifier: FailureClassifier
 ) -> Iterator[Frame]:
     """Yield frames with the probabilities of being lost and of exchanged sides."""
     means = EvidenceMeans(task.fps)
-    side_sums = np.zeros(3)
-    decay = math.exp(-1.0 / (MOMENT_SECONDS * task.fps))
+    landmark_sides = LandmarkSides(task.fps, len(task.cameras))
     for frame in frames:
         assert frame.posterior is not None
         evidence = evidence_of(task.body.skeleton, frame, task.cameras)
         features = means.features(evidence)
         exchanged = classifier.sides.probability(features)
-        # left and right are known unless the model or the landmarks say otherwise
         known = exchanged < classifier.unknown
         if (odds := frame.details.get("sides")) is not None:
-            side_sums = decay * side_sums + [*odds, 1.0]
-            legs, arms, count = side_sums
-            # landmarks of one camera are better evidence than its silhouettes
-            if len(task.cameras) == 1:
-                known = legs + arms >= MIN_SIDE_ODDS * count
-            # arms may be right where legs are exchanged, even if several cameras agree
-            known = bool(known and legs >= 0.0)
+            known = landmark_sides.known(odds, known)
         recalibration = replace(
             frame.posterior.recalibration or Recalibration(), second_side=float(known)
         )

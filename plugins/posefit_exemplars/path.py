@@ -287,7 +287,6 @@ class HypothesisPath:
         self._costs = costs
         self._delay = delay
         self._sampling = sampling
-        self._noise = MaskNoise(task.fps)
         self.proposals = HypothesisProposals(task, exemplars, evaluations)
 
     def follow(
@@ -303,23 +302,22 @@ class HypothesisPath:
             The estimates, each with up to `delay` later frames known.
 
         """
-        rows = None
-        self._noise = MaskNoise(self._task.fps)  # forgets an earlier track
+        sampled = None
         frames = self._frames(estimates, rng.spawn(1)[0])
         for window in markov.windows(frames, self._delay):
             states = [frame.states for frame in window]
-            estimate, hypotheses, *_ = window[0]
-            row = markov.viterbi_state([one.paths for one in states])
+            row = markov.viterbi_state([frame.paths for frame in states])
             weights = markov.state_weights(states)
+            estimate = window[0].estimate
+            hypotheses = window[0].hypotheses
             poses = hypotheses.poses
+            places = hypotheses.places
             reach = same_distance(estimate.frame_costs.camera_count)
             squares = hypotheses.squares_from(row) / reach**2
-            pose, place = markov.mean_near(
-                row, weights, squares, poses, hypotheses.places
-            )
-            rows = markov.sample_states(states, rows, self._sampling, rng)
+            pose, place = markov.mean_near(row, weights, squares, poses, places)
+            sampled = markov.sample_states(states, sampled, self._sampling, rng)
             paths = markov.SampledPaths.of(
-                self._task.body.skeleton, poses[rows], hypotheses.places[rows], pose
+                self._task.body.skeleton, poses[sampled], places[sampled], pose
             )
             yield replace(estimate, pose=pose, place=place, paths=paths)
 
@@ -330,19 +328,27 @@ class HypothesisPath:
 
         The evaluations of the estimates include the fits.
         """
+        mask_noise = MaskNoise(self._task.fps)
         before: _FittedFrame | None = None
         latest = Hypotheses.none()
         rows = np.empty(0, dtype=np.int64)
         for estimate in estimates:
+            frame_costs = estimate.frame_costs
             if before is not None:
                 latest = before.hypotheses
                 rows = self.proposals.continuing(
-                    latest, before.states.paths.totals, estimate.frame_costs
+                    latest, before.states.paths.totals, frame_costs
                 )
             fresh = self.proposals.fresh(estimate, latest, rows, rng)
-            noise, evaluations = self._noise.of(estimate.frame_costs, *fresh)
+            noise, evaluations = mask_noise.of(frame_costs, *fresh)
             hypotheses, used = self._fitted(estimate, fresh, latest, rows, noise)
-            joined = self._joined(estimate.frame_costs, hypotheses, before, noise)
+            pose_costs = np.zeros(len(hypotheses.poses))
+            if frame_costs.usable:
+                pose_costs, least = self._costs.of_poses(
+                    frame_costs, hypotheses.poses, hypotheses.places, noise
+                )
+                mask_noise.add(least)
+            joined = self._joined(frame_costs, hypotheses, pose_costs, before)
             evaluations += estimate.evaluations + used
             estimate = replace(estimate, evaluations=evaluations)
             before = _FittedFrame(estimate, hypotheses, *joined)
@@ -398,25 +404,28 @@ class HypothesisPath:
         self,
         frame_costs: FrameCosts,
         hypotheses: Hypotheses,
+        pose_costs: Array,
         before: _FittedFrame | None,
-        noise: float,
     ) -> tuple[markov.FrameStates, Array]:
         """Return the states of a frame, joined to the frame before.
 
-        With them come the probabilities (n, K) that groups of landmarks are exchanged.
+        Args:
+            frame_costs: The costs of the frame.
+            hypotheses: Its n hypotheses.
+            pose_costs: (n,) their costs without landmarks.
+            before: The frame before, or None.
+
+        Returns:
+            The states, and the probabilities (n, K) that groups of landmarks have left
+            and right exchanged.
+
         """
-        poses = hypotheses.poses
-        places = hypotheses.places
-        likelihoods = frame_costs.landmarks(poses, places)
+        likelihoods = frame_costs.landmarks(hypotheses.poses, hypotheses.places)
         exchanged = usually_exchanged(likelihoods)[None]
         if before is not None:
             exchanged = exchanged_next(before.exchanged, 1.0 / self._task.fps)
         landmarks = landmark_costs(likelihoods, exchanged[:, None])
-        costs = landmarks.min(axis=0)
-        if frame_costs.usable:
-            pose_costs, least = self._costs.of_poses(frame_costs, poses, places, noise)
-            costs += pose_costs
-            self._noise.add(least)
+        costs = landmarks.min(axis=0) + pose_costs
         if before is None:
             return markov.frame_states(costs), exchanged_given(likelihoods, exchanged)
         steps = self._costs.of_steps(frame_costs, before.hypotheses, hypotheses)

@@ -38,16 +38,16 @@ from posefit_exemplars.kernels import Rows
 from posefit_exemplars.lookup import YAW_TOLERANCE, Lookup
 
 BEAM_STATES = 200  # states that a frame keeps
-# Each candidate is also tried turned away from its clip, to either side, by so many
-# standard deviations of turns.
+# Turns away from the clip at which each candidate is tried, in standard deviations of
+# turns.
 CANDIDATE_TURNS = (0.0, -2.0, 2.0)
 # Share of the proposed states for where clips continue. The others are for a search
 # everywhere.
 CONTINUED_SHARE = 0.25
 # A search everywhere gives this share of its costs to poses that are similar to the
-# cheapest ones: so many of each one's group, drawn at random.
+# cheapest ones.
 SIMILAR_SHARE = 0.25
-GROUP_POSES = 20
+GROUP_POSES = 20  # similar poses, drawn at random from the group of each, at most
 
 FRESH_SHARE = 0.45  # share of the evaluations for fresh hypotheses
 REFLECTED_SHARE = 0.25  # share of reflections among the fresh hypotheses
@@ -81,11 +81,11 @@ def next_states(exemplars: Exemplars, steps: ClipSteps, count: int) -> Beam:
     )
     least = beam.totals.min()
     bounds = kernels.Bounds(steps.pose_cost, least, least + JUMP_COST, count)
-    places = len(exemplars.tiles.states)
-    room = kernels.Room(
-        np.full(places, np.inf),
-        np.empty(places, np.int64),
-        np.empty(places, np.int64),
+    slots = len(exemplars.tiles.states)
+    buffers = kernels.Buffers(
+        np.full(slots, np.inf),
+        np.empty(slots, np.int64),
+        np.empty(slots, np.int64),
     )
     bins = yaw_bins(steps.yaws)
     cheapest_first = np.argsort(beam.totals, kind="stable")
@@ -94,7 +94,7 @@ def next_states(exemplars: Exemplars, steps: ClipSteps, count: int) -> Beam:
     for number in np.unique(bins):
         rows = cheapest_first[bins[cheapest_first] == number]
         by_bin.append(
-            kernels.cheapest_steps(sources, rows, exemplars.tiles, room, bounds)
+            kernels.cheapest_steps(sources, rows, exemplars.tiles, buffers, bounds)
         )
     states, parents, totals = map(np.concatenate, zip(*by_bin, strict=True))
     # In order before they are repeated: three runs in order are merged in a fraction of
@@ -145,9 +145,9 @@ class StateProposals:
         if self._task.first_pose is None:
             beam, used = self._anywhere(frame_costs, None, count, rng)
         else:
-            room = int(CONTINUED_SHARE * count)
-            near = self._near_first_pose(self._task.first_pose, room)
-            beam, used = self._anywhere(frame_costs, None, count - room, rng)
+            near_count = int(CONTINUED_SHARE * count)
+            near = self._near_first_pose(self._task.first_pose, near_count)
+            beam, used = self._anywhere(frame_costs, None, count - near_count, rng)
             beam = joined(replace(beam, totals=beam.totals + JUMP_COST), near)
         return *self._placed(frame_costs, beam), used
 
@@ -168,11 +168,13 @@ class StateProposals:
             search used.
 
         """
-        room = int(CONTINUED_SHARE * count)
-        beam = next_states(self.exemplars, steps, room)
+        continued_count = int(CONTINUED_SHARE * count)
+        beam = next_states(self.exemplars, steps, continued_count)
         used = 0
         if everywhere:
-            other, used = self._anywhere(frame_costs, steps.beam, count - room, rng)
+            other, used = self._anywhere(
+                frame_costs, steps.beam, count - continued_count, rng
+            )
             beam = joined(other, beam)
         expected = beam.places
         beam, poses = self._placed(frame_costs, beam)
@@ -234,14 +236,14 @@ class StateProposals:
         members = self.exemplars.members
         starts = self.exemplars.starts
         drawn = list[Rows]()
-        found = 0
+        total = 0
         for group in self.exemplars.groups[states]:
             similar = members[starts[group] : starts[group + 1]]
             if len(similar) > GROUP_POSES:
                 similar = rng.choice(similar, GROUP_POSES, replace=False)
-            drawn.append(similar[: count - found])
-            found += len(drawn[-1])
-            if found == count:
+            drawn.append(similar[: count - total])
+            total += len(drawn[-1])
+            if total == count:
                 break
         rows = np.repeat(np.arange(len(drawn)), [len(similar) for similar in drawn])
         return np.concatenate(drawn), rows
@@ -254,8 +256,8 @@ class StateProposals:
         # squared distances up to a constant, which does not change their order
         squares = (codes**2).sum(axis=1) - 2.0 * (codes @ code)
         turns = TURN_SPREAD * np.array(CANDIDATE_TURNS)
-        room = min(count // len(turns), BEAM_STATES)
-        nearest = np.argsort(squares, kind="stable")[:room]
+        pose_count = min(count // len(turns), BEAM_STATES)
+        nearest = np.argsort(squares, kind="stable")[:pose_count]
         states = np.tile(nearest, len(turns))
         yaws = yaw + np.repeat(turns, len(nearest))
         return self._after_jump(states, yaws, None)

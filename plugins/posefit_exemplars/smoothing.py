@@ -31,23 +31,19 @@ def smoothed(
     for window in windows(estimates, ahead):
         near = [*before, *window]
         estimate = window[0]
-        poses, places = (
-            np.array([getattr(other, name) for other in near])
-            for name in ("pose", "place")
-        )
+        poses = np.array([other.pose for other in near])
+        places = np.array([other.place for other in near])
         pose, place = smoothed_pose(poses, places, len(before), spread)
-        yield replace(
-            estimate,
-            pose=pose,
-            place=place if estimate.frame_costs.root is None else estimate.place,
-        )
+        if estimate.frame_costs.root is not None:
+            place = estimate.place
+        yield replace(estimate, pose=pose, place=place)
         before.append(estimate)
 
 
 def smoothed_pose(
-    poses: Array, places: Array, k: int, spread: float
+    poses: Array, places: Array, middle: int, spread: float
 ) -> tuple[Array, Array]:
-    """Return the weighted mean pose (66,) and place (3,) around frame k.
+    """Return the weighted mean pose (66,) and place (3,) around a frame.
 
     Equally many frames before and after it count; otherwise the mean would lag behind a
     steady movement, or run ahead of it.
@@ -55,14 +51,15 @@ def smoothed_pose(
     Args:
         poses: (n, 66) the poses of the frames.
         places: (n, 3) their places.
-        k: The frame in the middle.
+        middle: The frame, as a row of `poses`.
         spread: Standard deviation of the weights, frames. 0 or less: no smoothing.
 
     """
     if spread <= 0.0:
-        return poses[k], places[k]
-    reach = min(k, len(poses) - 1 - k)
-    rows = np.arange(k - reach, k + reach + 1)
-    weights = np.exp(-0.5 * ((rows - k) / spread) ** 2)
+        return poses[middle], places[middle]
+    reach = min(middle, len(poses) - 1 - middle)
+    rows = np.arange(middle - reach, middle + reach + 1)
+    weights = np.exp(-0.5 * ((rows - middle) / spread) ** 2)
     weights /= weights.sum()
-    return poses[k] + weights @ wrapped(poses[rows] - poses[k]), weights @ places[rows]
+    differences = wrapped(poses[rows] - poses[middle])
+    return poses[middle] + weights @ differences, weights @ places[rows]

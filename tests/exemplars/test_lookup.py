@@ -115,6 +115,24 @@ def test_a_silhouette_that_is_cut_is_refused() -> None:
     assert Lookup(task_of([camera])).posterior(observation) is None
 
 
+def test_a_budget_for_less_than_one_comparison_suggests_nothing() -> None:
+    # of pictures below 32 pixels the small one is the full one, and 8 % of 12 is below 1
+    straight = looking_at(0.4, 0.0)
+    camera = Camera(
+        30,
+        30,
+        np.full(2, 37.5),
+        np.full(2, 15.0),
+        straight.rotation,
+        straight.translation,
+    )
+    observation = observed_by([camera], turned(3))
+    for evaluations, suggests in ((12, False), (13, True)):
+        task = replace(task_of([camera]), evaluations=evaluations)
+        posterior = Lookup(task).posterior(observation)
+        assert (posterior is not None) == suggests
+
+
 @each("optimiser", ["sapso", "cma"])
 def test_a_search_that_looks_faces_the_right_way(optimiser: str) -> None:
     pose = turned(3)
