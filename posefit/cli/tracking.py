@@ -143,6 +143,10 @@ def _track_live(
     frames = track_live(live, progress=shown, **chosen)
     each = (lambda frame: click.echo(json.dumps(frame.row))) if as_json else None
     summary = write_live(frames, out, each)
+    # as after Ctrl-C before the first pose
+    if not summary["frames"]:
+        shown.log("no frame was tracked")
+        return
     latency = summary["latency_ms"]
     shown.log(
         f"{summary['frames']} frames tracked, {summary['skipped']} skipped; "

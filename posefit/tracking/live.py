@@ -188,7 +188,8 @@ def write_live(
         on_frame: Called with each frame.
 
     Returns:
-        The numbers of tracked and skipped frames, and quantiles of the latency.
+        The numbers of tracked and skipped frames, and quantiles of the latency in
+        milliseconds, NaN without frames.
 
     Raises:
         InputError: If the folder exists, or the stream breaks off.

@@ -12,7 +12,9 @@ from contextlib import suppress
 import cv2
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from posefit.cli import main
 from posefit.errors import InputError
 from posefit.fitting.tracker import SynthesisTracker
 from posefit.footage import live
@@ -26,6 +28,7 @@ from posefit.motion import built_in
 from posefit.motion.bvh import write_bvh
 from posefit.progress import Progress
 from posefit.silhouette.cost import project
+from posefit.tracking import live as tracking_live
 from posefit.tracking.live import track_live, write_live
 from tests.cases import each
 from tests.files import arrays
@@ -226,6 +229,18 @@ def test_masks_in_a_pipe_become_poses_on_disk_also_if_it_breaks_off(
         (count, 66),
         (count, 3),
     )
+
+
+def test_a_stream_that_is_stopped_before_the_first_pose_has_no_latency(monkeypatch):
+    def stopped(*_arguments, **_options):
+        raise KeyboardInterrupt
+        yield
+
+    monkeypatch.setattr(tracking_live, "track_live", stopped)
+    result = CliRunner().invoke(main, ["track", "--live", "-"])
+    assert result.exit_code == 0
+    assert "no frame was tracked" in result.output
+    assert "nan" not in result.output
 
 
 def test_guesses_about_a_stream_are_logged_and_the_calibrations_unit_counts(
