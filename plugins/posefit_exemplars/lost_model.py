@@ -196,7 +196,7 @@ class LandmarkSides:
         known = by_model
         # landmarks of one camera are better evidence than its silhouettes
         if self._single:
-            known = legs + arms >= MIN_SIDE_ODDS * count
+            known = bool(legs + arms >= MIN_SIDE_ODDS * count)
         # arms may be right where legs are exchanged, even if several cameras agree
         return bool(known and legs >= 0.0)
 
