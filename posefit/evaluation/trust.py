@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.evaluation.errors import Table, flagged_share, mean_known
 from posefit.fitting.tracker import Frame, Observation
-from posefit.footage.quality import LAG, changed_pixels, moved_pixels
+from posefit.footage.quality import LAG_SECONDS, changed_pixels, moved_pixels
 from posefit.footage.scene import Scene
 from posefit.geometry.kernels import lower_to_nearest
 from posefit.geometry.skeleton import JOINTS, Skeleton
@@ -188,8 +188,8 @@ def explained_share(
     camera = scene.cameras[0]
     reach = 0
     counts = np.zeros(2, dtype=np.int64)  # of covered pixels, and of all that moved
-    # pictures are compared with one from `LAG` seconds before
-    lag = max(1, round(LAG * scene.fps))
+    # pictures are compared with one from `LAG_SECONDS` seconds before
+    lag = max(1, round(LAG_SECONDS * scene.fps))
     before: deque[tuple[Image, Mask, Mask]] = deque(maxlen=lag)
     for is_usable, frame, observation, image in zip(
         usable, frames, scene.observations, scene.pictures(), strict=False

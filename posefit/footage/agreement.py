@@ -12,11 +12,11 @@ from posefit.silhouette.mask import Silhouette, box_of
 
 # share of the person's height by which rays through the middles of masks may miss each
 # other
-APART = 0.7
+MAX_MISS = 0.7
 # a person's apparent height, times the real one: crouching or seen from above, and with
 # the arms up
-SHORT = 0.45
-TALL = 1.9
+MIN_APPARENT_HEIGHT = 0.45
+MAX_APPARENT_HEIGHT = 1.9
 
 
 def extent_of(silhouette: Silhouette) -> tuple[Array, float]:
@@ -119,12 +119,14 @@ def disagreement(miss: float, tall: Array, stature: float) -> str | None:
         "the masks show only parts of the person, or another one, "
         "or the calibrations are in another order or unit"
     )
-    if miss > APART * stature:
+    if miss > MAX_MISS * stature:
         return (
             "expected cameras that see one person, got views that disagree by "
             f"{miss:.1f} m: {reasons}"
         )
-    wrong = np.flatnonzero((tall < SHORT * stature) | (tall > TALL * stature))
+    wrong = np.flatnonzero(
+        (tall < MIN_APPARENT_HEIGHT * stature) | (tall > MAX_APPARENT_HEIGHT * stature)
+    )
     if len(wrong):
         k = int(wrong[0])
         return (

@@ -40,10 +40,10 @@ from posefit.reading import check_size, cut, existing, quoted
 from posefit.silhouette.mask import Mask
 
 ANNOTATIONS = ".json"
-LARGEST = 500_000_000  # bytes
-PERSON = "person"  # the category that is taken by default
-FINE = 5  # parts of a pixel to which corners of polygons are rounded
-FAR = 4  # times width and height: how far outside corners may be
+MAX_FILE_BYTES = 500_000_000  # bytes
+DEFAULT_CATEGORY = "person"  # the category that is taken by default
+SUBPIXELS = 5  # parts of a pixel to which corners of polygons are rounded
+MAX_OUTSIDE = 4  # times width and height: how far outside corners may be
 Runs = NDArray[np.int64]  # lengths of runs, of background and person in turn
 
 
@@ -58,14 +58,14 @@ def read_annotations(
     Args:
         path: The file.
         frames: Which frames to read.
-        category: The people's category; by default `PERSON`, or the only one.
+        category: The people's category; by default `DEFAULT_CATEGORY`, or the only one.
         fps: Frames per second.
 
     Raises:
         InputError: The file is not of this format, or has no such category.
 
     """
-    check_size(existing(path), LARGEST)
+    check_size(existing(path), MAX_FILE_BYTES)
     if isinstance(category, int):
         raise InputError(
             f"label must be left out for annotations, got {category} for {path}: "
@@ -205,8 +205,8 @@ class _Content:
         if wanted is None and len(named) == 1:
             (wanted,) = named
         elif wanted is None:
-            wanted = PERSON
-            self.guesses.append(f"{self._path}: the category {PERSON}")
+            wanted = DEFAULT_CATEGORY
+            self.guesses.append(f"{self._path}: the category {DEFAULT_CATEGORY}")
         if wanted not in named:
             there = cut(", ".join(map(quoted, named))) or "none"
             raise InputError(
@@ -217,7 +217,7 @@ class _Content:
 
     def _images(self, images: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         """Return the images by the name of their file."""
-        found = dict[str, Any]()
+        by_name = dict[str, Any]()
         for image in images:
             sides = _key(image.get("width")), _key(image.get("height"))
             name = image.get("file_name")
@@ -229,23 +229,23 @@ class _Content:
                     f"images of up to {PIXELS // 10**6} million pixels, "
                     f"got {sides[0]}x{sides[1]}"
                 )
-            if str(Path(name)) in found:
+            if str(Path(name)) in by_name:
                 raise self._error(f"each image once, got {quoted(name)} twice")
-            found[str(Path(name))] = {
+            by_name[str(Path(name))] = {
                 "id": _key(image.get("id")),
                 "width": sides[0],
                 "height": sides[1],
             }
-        numbers = Counter(each["id"] for each in found.values())
+        numbers = Counter(each["id"] for each in by_name.values())
         for number, count in numbers.items():
             if count > 1:
                 raise self._error(
                     f"images with an id each, got {quoted(number)} for {count} images"
                 )
-        sizes = {(each["width"], each["height"]) for each in found.values()}
+        sizes = {(each["width"], each["height"]) for each in by_name.values()}
         if len(sizes) != 1:
             raise self._error(f"images of one size, got {len(sizes)} sizes")
-        return found
+        return by_name
 
     def masks(self, image: Any, size: tuple[int, int]) -> tuple[Mask, Mask]:
         """Return the pixels of the people in an image, and of its crowds.
@@ -309,10 +309,10 @@ def filled(corners: Array, size: tuple[int, int]) -> Mask:
         raise ValueError("a polygon needs three corners or more")
     width, height = size
     # not finite, or so far outside that its outline would fill the memory
-    if not np.abs(corners).max() <= FAR * (width + height):
+    if not np.abs(corners).max() <= MAX_OUTSIDE * (width + height):
         raise ValueError("a polygon needs corners near its image")
     # truncated, as a conversion to a whole number in C is
-    fine = np.trunc(FINE * corners.reshape(-1, 2) + 0.5).astype(np.int64)
+    fine = np.trunc(SUBPIXELS * corners.reshape(-1, 2) + 0.5).astype(np.int64)
     line = np.concatenate(
         [
             _between(start, stop)
@@ -325,9 +325,9 @@ def filled(corners: Array, size: tuple[int, int]) -> Mask:
     # where the outline crosses from one fine column to the next
     across = np.where(after[:, 0] < before[:, 0], after[:, 0], after[:, 0] - 1)[turns]
     down = np.minimum(before[:, 1], after[:, 1])[turns]
-    columns, off = np.divmod(across - FINE // 2, FINE)
+    columns, off = np.divmod(across - SUBPIXELS // 2, SUBPIXELS)
     inside = (off == 0) & (columns >= 0) & (columns < width)
-    rows = np.ceil((down[inside] + 0.5) / FINE - 0.5)
+    rows = np.ceil((down[inside] + 0.5) / SUBPIXELS - 0.5)
     rows = np.clip(rows, 0, height).astype(np.int64)
     # from a crossing down to the end of all columns, inside and outside are exchanged
     crossings = np.bincount(

@@ -20,7 +20,7 @@ from posefit.footage.agreement import (
 from posefit.footage.facing import yaws_of
 from posefit.footage.observations import Observations
 from posefit.footage.options import SourceOptions
-from posefit.footage.people import Persons, part_at, paste
+from posefit.footage.people import Persons, Tracklet, part_at, paste
 from posefit.footage.scene import Scene
 from posefit.footage.straightening import fitting, straightening
 from posefit.footage.views import View
@@ -29,7 +29,7 @@ from posefit.geometry.body import Body
 from posefit.geometry.calibration import Calibration
 from posefit.geometry.camera import Camera
 from posefit.motion.clips import FPS
-from posefit.silhouette.mask import Silhouette
+from posefit.silhouette.mask import Mask, Silhouette
 
 
 def combined(
@@ -66,7 +66,7 @@ def combined(
             "a level camera, 40 degrees across: distances and sizes are as good as that"
         )
     world, metres, of_cameras = world_of(known, options.up, options.unit)
-    cameras, views, said = _straightened(views, known, world, metres)
+    cameras, views, notes = _straightened(views, known, world, metres)
     # several cameras distinguish front and back themselves
     facings = views[0].facings if len(views) == 1 else None
     yaws = yaws_of(() if facings is None else facings, cameras[0], rate)
@@ -95,7 +95,7 @@ def combined(
         observations=observations,
         placing="given" if known else "guessed",
         warnings=[*warnings, *_unequal(views)],
-        guesses=[*guesses, *said, *of_cameras.values()],
+        guesses=[*guesses, *notes, *of_cameras.values()],
         pictures=views[0].pictures,
         first=int(views[0].numbers[0]),
         camera_moves=views[0].moves,
@@ -118,13 +118,15 @@ def _straightened(
         return [guessed], [*views], []
     cameras = list[Camera]()
     straight = list[View]()
-    said = list[str]()
+    notes = list[str]()
     for each, view in zip(known, views, strict=True):
-        camera, how, words = straightening(each, view.size, view.filmed, world, metres)
+        camera, how, camera_notes = straightening(
+            each, view.size, view.filmed, world, metres
+        )
         cameras.append(camera)
         straight.append(view if how is None else how.of(view))
-        said += words
-    return cameras, straight, said
+        notes += camera_notes
+    return cameras, straight, notes
 
 
 def _of_one_size(
@@ -225,31 +227,57 @@ def same_person(
         fitted.append(camera)
     differences = list[float]()
     for person in persons:
-        misses = list[float]()  # by how much rays miss each other
-        heights = list[Array]()  # (2,) of the person in both views
+        misses = list[float]()
+        heights = list[Array]()
         for k in np.flatnonzero(first.usable).tolist():
-            part = part_at(person, k)
-            if part is None:
+            mask = _mask_alone(person, k, size)
+            if mask is None:
                 continue
-            shown, hidden = part.detections[k]
-            # a person behind another has no reliable height
-            if hidden is not None:
-                continue
-            mask = np.zeros(size[::-1], dtype=bool)
-            paste(shown, mask)
             silhouettes = (first.silhouette(k), Silhouette.of(mask))
             extents = [*map(_extent, fitted, silhouettes)]
             miss, tall = apparent_size(cameras, extents)
             misses.append(miss)
             heights.append(np.maximum(tall, LEAST_HEIGHT))
-        if not misses:
-            differences.append(np.inf)
-            continue
-        height = float(np.median(heights))
-        relative = [miss / height for miss in misses]
-        spread = np.std(np.log(np.array(heights)))
-        differences.append(float(np.median(relative) + spread))
+        differences.append(_difference(misses, heights))
     return 1 + int(np.argmin(differences))
+
+
+def _mask_alone(
+    person: Sequence[Tracklet], frame: int, size: tuple[int, int]
+) -> Mask | None:
+    """Return the mask of a person in a frame; None if it does not show them alone.
+
+    A person behind another has no reliable height.
+    """
+    part = part_at(person, frame)
+    if part is None:
+        return None
+    shown, hidden = part.detections[frame]
+    if hidden is not None:
+        return None
+    mask = np.zeros(size[::-1], dtype=bool)
+    paste(shown, mask)
+    return mask
+
+
+def _difference(misses: Sequence[float], heights: Sequence[Array]) -> float:
+    """Return how unlikely it is that two views show one person.
+
+    Args:
+        misses: By how much the rays of both cameras miss each other in each frame.
+        heights: (2,) the person's height by both views in each frame, in the same unit.
+
+    Returns:
+        The typical miss in heights, and the spread of the heights' logarithms, added;
+        infinite without any frame.
+
+    """
+    if not misses:
+        return np.inf
+    height = float(np.median(heights))
+    relative = [miss / height for miss in misses]
+    spread = np.std(np.log(np.array(heights)))
+    return float(np.median(relative) + spread)
 
 
 def _extent(known: Camera | Calibration, silhouette: Silhouette) -> tuple[Array, float]:

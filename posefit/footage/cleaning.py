@@ -22,7 +22,7 @@ from posefit.silhouette.foreground import MAX_HOLE_AREA, without_holes
 from posefit.silhouette.mask import Mask, Silhouette, touches_border
 from posefit.silhouette.pieces import people_in
 
-BORDERS = 500  # frames whose borders are looked at together
+BORDER_FRAMES = 500  # frames whose borders are looked at together
 # share of the person's area: the largest hole that is filled if there is one mask only.
 # A hole between an arm and the trunk shows where the arm is, and no other frame does
 MAX_HOLE_ALONE = 0.0005
@@ -152,13 +152,13 @@ def _is_inverted(view: View) -> bool:
         return False
     covered = np.empty(len(view), dtype=bool)
     # a piece at a time, because the borders of a long film need much memory
-    for first in range(0, len(view), BORDERS):
-        piece = slice(first, first + BORDERS)
+    for first in range(0, len(view), BORDER_FRAMES):
+        piece = slice(first, first + BORDER_FRAMES)
         marked = border_of(view.bits[piece], view.size)
-        release(view.bits, first, BORDERS)
+        release(view.bits, first, BORDER_FRAMES)
         known = np.ones_like(marked)
         if view.known is not None:
             known = border_of(view.known[piece], view.size)
-            release(view.known, first, BORDERS)
+            release(view.known, first, BORDER_FRAMES)
         covered[piece] = (marked & known).sum(axis=1) > MOST * known.sum(axis=1)
     return bool(np.mean(covered[shows]) > MOST)

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from posefit.errors import NoPersonError
-from posefit.footage.people import AROUND, MIN_DETECTIONS
+from posefit.footage.people import MIN_DETECTIONS, SEARCH_REACH
 from posefit.footage.quality import at_edge, changed_pixels
 from posefit.footage.scanner import Scanner
 from posefit.footage.segmenter import PersonSegmenter
@@ -20,16 +20,16 @@ from posefit.silhouette.foreground import Image, Person
 from posefit.silhouette.pieces import RIVAL_AREA
 
 # a person who is cut in all frames for this long may be cut in the others, too
-SECONDS = 2.0
+CUT_SECONDS = 2.0
 # frames between those looked at: a person who is whole in fewer is hardly worth it
-STEP = MIN_DETECTIONS
+LOOK_STEP = MIN_DETECTIONS
 
 
 class CutWatch:
     """Watches a pass through a film, frame after frame.
 
     While everybody in the picture is cut, it cannot tell whether that will change.
-    After two seconds of that it looks ahead, at every eighth frame to the end.
+    After two seconds of that it looks ahead, at every eighth frame up to the end.
     """
 
     def __init__(self, scanner: Scanner) -> None:
@@ -50,22 +50,22 @@ class CutWatch:
         self._watching = not _is_whole(blobs)
         self._cut += blobs[0].touches_border
         fps = self._scanner.video.fps
-        if self._watching and self._cut >= SECONDS * fps:
+        if self._watching and self._cut >= CUT_SECONDS * fps:
             self._watching = False
             self._look(k + 1)
 
-    def _look(self, seen: int) -> None:
-        """Look at the frames after the first ones."""
+    def _look(self, start: int) -> None:
+        """Look at some of the frames from `start` on, counted from 0."""
         scanner = self._scanner
         segmenter = scanner.segmenter
         if not registry().offer("segmenter", scanner.how.name).still_background:
             # a network follows people: the pass's own is left as it is
             segmenter = PersonSegmenter(scanner.video, scanner.how)
         cut = self._cut
-        looked = seen
+        looked = start  # frames looked at, with those before
         before: tuple[Image, Person] | None = None
-        start = scanner.start + seen
-        for image in scanner.video.frames(start, scanner.stop, STEP):
+        frames = scanner.video.frames(scanner.start + start, scanner.stop, LOOK_STEP)
+        for image in frames:
             blobs = segmenter.frame(image).people
             if _is_whole(blobs) or (before and _others_move(image, blobs[0], *before)):
                 return
@@ -90,7 +90,7 @@ def _others_move(image: Image, person: Person, then: Image, earlier: Person) -> 
     A network may report the person who is cut while another is whole.
     """
     mask = person.mask | earlier.mask
-    reach = round(AROUND * max(cv2.boundingRect(mask.astype(np.uint8))[2:]))
+    reach = round(SEARCH_REACH * max(cv2.boundingRect(mask.astype(np.uint8))[2:]))
     kernel = np.ones((2 * reach + 1, 2 * reach + 1), dtype=np.uint8)
     near = cv2.dilate(mask.astype(np.uint8), kernel) > 0
     moved = (changed_pixels(image, then) & ~near).sum()

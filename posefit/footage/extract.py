@@ -29,11 +29,11 @@ from posefit.motion.clips import FPS
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
 
-GREY = 128  # level of the preview's pictures if there is no film
+BLANK_LEVEL = 128  # level of the preview's pictures if there is no film
 # colours of the person in the preview (blue, green, red): green, and red in frames that
 # are not usable
-USABLE = (90, 200, 90)
-UNUSABLE = (60, 60, 230)
+USABLE_COLOUR = (90, 200, 90)
+UNUSABLE_COLOUR = (60, 60, 230)
 
 
 def extract(
@@ -166,7 +166,7 @@ def _pictures(view: View) -> Iterator[Image]:
     if view.pictures is not None:
         return view.pictures()
     width, height = view.size
-    return repeat(np.full((height, width, 3), GREY, dtype=np.uint8), len(view))
+    return repeat(np.full((height, width, 3), BLANK_LEVEL, dtype=np.uint8), len(view))
 
 
 def _write_npz(path: Path, view: View) -> None:
@@ -198,7 +198,7 @@ def _write_npz(path: Path, view: View) -> None:
 
 def _painted(image: Image, person: Silhouette, usable: bool) -> Image:
     """Return a picture with the person tinted, and unknown pixels darkened."""
-    colour = np.array(USABLE if usable else UNUSABLE, dtype=np.float32)
+    colour = np.array(USABLE_COLOUR if usable else UNUSABLE_COLOUR, dtype=np.float32)
     painted = image.copy()
     painted[~person.valid] //= 2
     painted[person.mask] = (0.5 * painted[person.mask] + 0.5 * colour).astype(np.uint8)

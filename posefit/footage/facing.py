@@ -8,12 +8,12 @@ from posefit.arrays import Array
 from posefit.geometry.camera import Camera
 
 # share of the longer side: a person who moves farther across the picture within
-# `STAYING` is not on the spot
-CROSSING = 0.35
-STAYING = 2.0  # seconds before and after a frame
-AROUND = 0.5  # seconds before and after a frame over which facings are averaged
+# `STAYING_SECONDS` is not on the spot
+CROSSING_SHARE = 0.35
+STAYING_SECONDS = 2.0  # seconds before and after a frame
+MEAN_SECONDS = 0.5  # seconds before and after a frame over which facings are averaged
 # least length of the mean of unit vectors: shorter means that facings contradict
-AGREEMENT = 0.6
+MIN_AGREEMENT = 0.6
 
 
 def facings_on_the_spot(
@@ -35,13 +35,13 @@ def facings_on_the_spot(
 
     """
     result = np.array(facings, dtype=np.float64)
-    reach = max(round(STAYING * fps), 1)
+    reach = max(round(STAYING_SECONDS * fps), 1)
     for k in range(len(result)):
         rows = slice(max(k - reach, 0), k + reach + 1)
         known = np.isfinite(middles[rows])
         across = np.asarray(middles[rows])[known]
         side = np.asarray(sides[rows])[known]
-        if known.any() and np.ptp(across) > CROSSING * np.median(side):
+        if known.any() and np.ptp(across) > CROSSING_SHARE * np.median(side):
             result[k] = np.nan
     return result
 
@@ -59,7 +59,7 @@ def yaws_of(facings: Array | Sequence[float], camera: Camera, fps: float) -> Arr
 
     """
     values = np.asarray(facings, dtype=np.float64)
-    reach = max(round(AROUND * fps), 1)
+    reach = max(round(MEAN_SECONDS * fps), 1)
     towards = np.arctan2(-camera.rotation[2, 0], -camera.rotation[2, 2])
     known = np.isfinite(values)
     directions = np.where(known, np.exp(1j * (np.nan_to_num(values) + towards)), 0.0)
@@ -67,5 +67,5 @@ def yaws_of(facings: Array | Sequence[float], camera: Camera, fps: float) -> Arr
     total = np.array([directions[rows].sum() for rows in around])  # (T,) complex
     count = np.array([known[rows].sum() for rows in around])
     # the limit excludes frames without any facing, whose total is 0
-    agrees = np.abs(total) >= np.maximum(AGREEMENT * count, 1e-9)
+    agrees = np.abs(total) >= np.maximum(MIN_AGREEMENT * count, 1e-9)
     return np.where(agrees, np.angle(total), np.nan)

@@ -186,17 +186,17 @@ def resolve(source: Any) -> Resolved:
 
 def _check_each_once(named: Sequence[Footage]) -> None:
     """Raise InputError if two cameras have the same source."""
-    seen = list[Any]()
+    earlier = list[Any]()
     for each in named:
         key = each
         if isinstance(each, str | Path):
             key = Path(each).resolve()
-        if any(key is other or _is_same(key, other) for other in seen):
+        if any(key is other or _is_same(key, other) for other in earlier):
             what = "the same array"
             if not isinstance(each, np.ndarray):
                 what = str(each[0] if isinstance(each, tuple) else each)
             raise InputError(f"each camera must have its own source, got {what} twice")
-        seen.append(key)
+        earlier.append(key)
 
 
 def _is_same(one: Any, other: Any) -> bool:

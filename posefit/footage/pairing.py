@@ -103,19 +103,19 @@ def calibrated(
 
 def _check_places(cameras: Sequence[Camera | Calibration]) -> None:
     """Raise InputError if two cameras are at one place and look the same way."""
-    seen = list[tuple[bytes, str]]()
+    earlier = list[tuple[bytes, str]]()  # the place and the name of each camera
     for number, camera in enumerate(cameras, 1):
         if camera.rotation is None or camera.translation is None:
             continue
         place = np.column_stack([camera.rotation, camera.translation])
         name = camera.name if isinstance(camera, Calibration) else f"camera {number}"
-        for other, its_name in seen:
-            if other == place.tobytes():
+        for other_place, other_name in earlier:
+            if other_place == place.tobytes():
                 raise InputError(
                     "cameras must stand at different places, got one place and one "
-                    f"direction for {its_name} and {name}"
+                    f"direction for {other_name} and {name}"
                 )
-        seen.append((place.tobytes(), name))
+        earlier.append((place.tobytes(), name))
 
 
 def order_by_name(
@@ -186,10 +186,10 @@ def _order_by_part(names: Sequence[str], given: Sequence[str]) -> Pairing | None
     order = list[int]()
     for source in given:
         text = f" {' '.join(_words(source))} "
-        found = [k for k, name in enumerate(words) if name.strip() and name in text]
-        if len(found) != 1:
+        contained = [k for k, name in enumerate(words) if name.strip() and name in text]
+        if len(contained) != 1:
             return None
-        order += found
+        order += contained
     return tuple(order) if len(set(order)) == len(names) else None
 
 

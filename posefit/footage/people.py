@@ -22,17 +22,21 @@ from posefit.silhouette.pieces import RIVAL_AREA
 # times the height: a person is at most this far from where they are expected
 MAX_STEP = 1.0
 MAX_GAP_SECONDS = 1.0  # a person who is hidden for longer counts as another one
-MEMORY = 0.8  # share of the last step, size and colours that is kept with each frame
+# share of the last step, size and colours that is kept with each frame
+MEMORY_SHARE = 0.8
 # share of a person's expected outline: a blob that covers more of it shows them
-COVERED = 0.3
-SLACK = 0.04  # share of the height by which a person may be off their expected outline
-AROUND = 0.3  # share of the height around a person in which a network looks for them
+COVERED_SHARE = 0.3
+# share of the height by which a person may be off their expected outline
+OUTLINE_SLACK = 0.04
+# share of the height around a person in which a network looks for them
+SEARCH_REACH = 0.3
 # a mask is a person's if it has this many times as many pixels of them as of any other
-CLEARER = 2.0
+CLEAR_FACTOR = 2.0
 MIN_DETECTIONS = 8  # frames that show a person alone; fewer may be noise
-COLOUR = 0.01  # heights: the distance that one grey level of different colour adds
-AREA = 0.5  # heights: the distance that an area e times as large adds
-GAP_SECONDS = 1.0  # a gap of this many seconds halves what a distance counts
+# heights: the distance that one grey level of different colour adds
+COLOUR_DISTANCE = 0.01
+AREA_DISTANCE = 0.5  # heights: the distance that an area e times as large adds
+HALVING_SECONDS = 1.0  # a gap of this many seconds halves what a distance counts
 UNREACHABLE = 1e6  # heights: replaces infinity, which the assignment does not accept
 
 
@@ -122,10 +126,10 @@ class Tracklet:
         if away > MAX_STEP:
             return np.inf
         size = float(abs(np.log(blob.area / self.area)))
-        return away + COLOUR * colour + AREA * size
+        return away + COLOUR_DISTANCE * colour + AREA_DISTANCE * size
 
     def outline(self, frame: int) -> Mask:
-        """Return the mask where the person is expected, widened by `SLACK`."""
+        """Return the mask where the person is expected, widened by `OUTLINE_SLACK`."""
         across, down = self.expected(frame) - self.latest.place
         shift = np.array([[1.0, 0.0, across], [0.0, 1.0, down]])
         mask = self.latest.mask.astype(np.uint8)
@@ -137,11 +141,15 @@ class Tracklet:
         if frame > self.last:
             step = (blob.place - self.latest.place) / (frame - self.last)
             # the first step has no earlier one to be smoothed with
-            share = MEMORY if self.alone > 1 else 0.0
+            share = MEMORY_SHARE if self.alone > 1 else 0.0
             self._step = share * self._step + (1.0 - share) * step
-            self.area = MEMORY * self.area + (1.0 - MEMORY) * blob.area
-            self.colours = MEMORY * self.colours + (1.0 - MEMORY) * blob.colours
-            self.height = MEMORY * self.height + (1.0 - MEMORY) * blob.height
+            self.area = MEMORY_SHARE * self.area + (1.0 - MEMORY_SHARE) * blob.area
+            self.colours = (
+                MEMORY_SHARE * self.colours + (1.0 - MEMORY_SHARE) * blob.colours
+            )
+            self.height = (
+                MEMORY_SHARE * self.height + (1.0 - MEMORY_SHARE) * blob.height
+            )
         self.alone += 1
         self.last = frame
         self.latest = blob
@@ -201,7 +209,7 @@ class People:
             for tracklet, outline in outlines:
                 is_large = tracklet.area >= RIVAL_AREA * blob.area
                 covered = (outline & blob.mask).sum()
-                if is_large and covered > COVERED * outline.sum():
+                if is_large and covered > COVERED_SHARE * outline.sum():
                     hidden.append(tracklet)
             owner = owners.get(k)
             if owner is None and not hidden:
@@ -375,12 +383,16 @@ def _distance(tracklet: Tracklet, other: Tracklet, fps: float) -> float:
     size = float(abs(np.log(second.area / first.area)))
     # the longer a person was hidden, the farther they may have walked
     gap = max(0, start - first.last) / fps
-    return COLOUR * colour + AREA * size + away / (1.0 + gap / GAP_SECONDS)
+    return (
+        COLOUR_DISTANCE * colour
+        + AREA_DISTANCE * size
+        + away / (1.0 + gap / HALVING_SECONDS)
+    )
 
 
 def _widened(mask: NDArray[Any], height: float) -> Mask:
-    """Return a mask widened by `SLACK` of a person's height."""
-    width = 2 * round(SLACK * height) + 1
+    """Return a mask widened by `OUTLINE_SLACK` of a person's height."""
+    width = 2 * round(OUTLINE_SLACK * height) + 1
     return cv2.dilate(mask, np.ones((width, width), dtype=np.uint8)) > 0
 
 
@@ -444,9 +456,9 @@ def person_indices(persons: Persons, masks: Iterable[Mask]) -> list[int | None]:
         masks: The mask (height, width) of each frame, from another segmenter.
 
     """
-    beside = -1
+    nobody = -1  # for a mask that shows nobody, until it gets a person
     result = list[int | None]()
-    several = list[bool]()
+    several = list[bool]()  # of masks on several people: whether they cover several
     for k, mask in enumerate(masks):
         present = [part_at(parts, k) for parts in persons]
         pixels = [
@@ -455,17 +467,17 @@ def person_indices(persons: Persons, masks: Iterable[Mask]) -> list[int | None]:
         ]
         areas, shares = np.array(pixels).T  # (people,) pixels of each, and in the mask
         *_, second, most = sorted(shares)
-        if not mask.any() or most < CLEARER * second:
+        if not mask.any() or most < CLEAR_FACTOR * second:
             result.append(None)
         else:
-            result.append(int(shares.argmax()) if most else beside)
+            result.append(int(shares.argmax()) if most else nobody)
         if mask.any() and (areas > 0).sum() > 1:
             several.append((2 * shares > areas).sum() > 1)
-    latest = next((index for index in result if index not in (None, beside)), None)
+    latest = next((index for index in result if index not in (None, nobody)), None)
     if latest is None or (several and np.mean(several) > 0.5):
         return [None] * len(result)
     for k, index in enumerate(result):
-        if index == beside:
+        if index == nobody:
             result[k] = None if part_at(persons[latest], k) else latest
         elif index is not None:
             latest = index
@@ -520,7 +532,7 @@ def excluded_mask(
             paste(cut, own)
     mask &= ~own
     near = np.zeros_like(mask)
-    near[padded_box(own, round(AROUND * part.height))] = True
+    near[padded_box(own, round(SEARCH_REACH * part.height))] = True
     mask |= ~near
     return mask
 

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.footage.people import MIN_DETECTIONS, SLACK
+from posefit.footage.people import MIN_DETECTIONS, OUTLINE_SLACK
 from posefit.footage.views import MOST
 from posefit.silhouette.foreground import Image, Person
 from posefit.silhouette.mask import Mask, box_of, padded_box
@@ -26,10 +26,10 @@ AREA_FRAMES = 15  # number of earlier frames that a frame's area is compared wit
 AREA_CHANGE = 0.5
 # area of a silhouette over the square of its longer side. In 1,296 poses of the
 # library, seen from all sides, it is 0.08 to 0.47
-FILL = (0.07, 0.5)
+FILL_RANGE = (0.07, 0.5)
 # pixels: a silhouette with a shorter longer side could be noise
 MIN_SIDE = 12
-LAG = 0.1  # seconds between two pictures that are compared for motion
+LAG_SECONDS = 0.1  # seconds between two pictures that are compared for motion
 MOVING_LEVELS = 25  # grey levels by which a pixel changes if something moved
 # share of the person's longer side: how far from the mask motion is searched
 MOTION_REACH = 0.5
@@ -39,14 +39,14 @@ MOTION_REACH = 0.5
 PEOPLE_SEGMENTER = "mediapipe"
 # share of the moving pixels outside the masks, as a median over frames: with more, the
 # masks are not the person
-UNEXPLAINED = 0.3
+UNEXPLAINED_SHARE = 0.3
 # shares by which the longer side and the area change from frame to frame: the masks are
 # unsteady if more than one frame in ten changes more
-TALLER = 0.15
-LARGER = 0.25
+UNSTEADY_SIDE = 0.15
+UNSTEADY_AREA = 0.25
 CHANGE_PERCENTILE = 90
 # share of the frames whose masks show an empty place: with more, the user is warned
-GHOSTS = 0.1
+GHOST_SHARE = 0.1
 
 
 class Changes:
@@ -86,7 +86,7 @@ class FrameQuality:
         self._still = still
         self._edges = None if background is None else _edges(background)
         self._changes = Changes()
-        lag = max(1, round(LAG * fps))
+        lag = max(1, round(LAG_SECONDS * fps))
         self._before: deque[tuple[int, Image, Mask]] = deque(maxlen=lag)
         self._areas: deque[int] = deque(maxlen=AREA_FRAMES)
         self._sides: deque[int] = deque(maxlen=AREA_FRAMES)
@@ -112,7 +112,7 @@ class FrameQuality:
         likely = (
             whole
             and side >= MIN_SIDE
-            and FILL[0] <= person.area / side**2 <= FILL[1]
+            and FILL_RANGE[0] <= person.area / side**2 <= FILL_RANGE[1]
             and outside <= MOST
             and not ghost
         )
@@ -145,7 +145,7 @@ class FrameQuality:
         reach = max(side, *self._sides) if self._sides else side
         changed = self._changes.between((number, before), (frame, image))
         changed = changed & person.valid
-        moved, inside = moved_pixels(changed, covered, covered, reach, SLACK)
+        moved, inside = moved_pixels(changed, covered, covered, reach, OUTLINE_SLACK)
         outside = moved - inside
         return outside / moved if moved else 0.0
 
@@ -253,18 +253,18 @@ def verdict(
     pairs = [(a, b) for a, b in pairwise(whole) if b["frame"] == a["frame"] + 1]
     taller = _change(pairs, "longer_side")
     larger = _change(pairs, "area")
-    unsteady = taller > TALLER or larger > LARGER
+    unsteady = taller > UNSTEADY_SIDE or larger > UNSTEADY_AREA
     ghosts = float(np.mean([row["ghost"] for row in whole]))
     broken = float(np.mean([row["pieces"] > 1 for row in whole]))
     moves = f"{outside:.0%} of what moves"
     changes = f"change by {larger:.0%} from frame to frame"
-    if outside > UNEXPLAINED and unsteady:
+    if outside > UNEXPLAINED_SHARE and unsteady:
         where = "the masks do not show the whole person"
         if learned:
             where = "the person seems to stand in the background"
         text = f"{where}: {moves} lies outside the masks, and they {changes}"
         refused = True
-    elif ghosts > GHOSTS:
+    elif ghosts > GHOST_SHARE:
         text = (
             f"{ghosts:.0%} of the masks show a place that is empty now: the person was "
             "learned into the background"
@@ -278,7 +278,7 @@ def verdict(
             pieces = f" and are in pieces in {broken:.0%} of the frames"
         text = f"the masks {changes}{pieces}: parts of the person seem to be missing"
         refused = usable < MOST * len(whole) or broken > MOST
-    elif outside > UNEXPLAINED:
+    elif outside > UNEXPLAINED_SHARE:
         text = (
             f"{moves} near the person lies outside the masks, which may miss parts of "
             "the person"

@@ -8,14 +8,14 @@ from posefit.arrays import Array
 Order = NDArray[np.int64]  # (T,) numbers of frames
 # share of the distance between frames: if a frame comes this much too early or too
 # late, the frames are not at even times
-UNEVEN = 0.75
+UNEVEN_SHARE = 0.75
 # seconds: many files round the times of frames to milliseconds
-STAMP = 1e-3
+STAMP_SECONDS = 1e-3
 # share by which a film's length may differ from the length by its stated rate
-SAME_RATE = 5e-3
+SAME_LENGTH = 5e-3
 # times the mean rate: the highest rate at which uneven frames are sampled, because a
 # few frames close together say nothing about the rest
-DENSEST = 4.0
+MAX_DENSITY = 4.0
 
 
 def even(times: Array, fps: float) -> tuple[Order, NDArray[np.bool_], float]:
@@ -41,9 +41,9 @@ def even(times: Array, fps: float) -> tuple[Order, NDArray[np.bool_], float]:
         return numbers, all_filmed, fps
     mean = float(apart.mean())
     largest_miss = float(np.abs(times - times[0] - mean * numbers).max())
-    if largest_miss <= UNEVEN * mean:
+    if largest_miss <= UNEVEN_SHARE * mean:
         return numbers, all_filmed, rate_of(times, largest_miss, fps)
-    usual = max(float(np.median(apart)), mean / DENSEST)
+    usual = max(float(np.median(apart)), mean / MAX_DENSITY)
     # times are rounded, so the median is inexact: the mean over all steps is better
     steps = np.maximum(np.round(apart / usual), 1.0)
     usual = float(apart.sum() / steps.sum())
@@ -75,7 +75,7 @@ def rate_of(times: Array, off: float, stated: float) -> float:
     lasted = float(times[-1] - times[0])
     rate = intervals / lasted
     # both the first and the last time may be wrong by `off`
-    slack = max(STAMP + 2.0 * off, SAME_RATE * lasted)
+    slack = max(STAMP_SECONDS + 2.0 * off, SAME_LENGTH * lasted)
 
     def miss(likely: float) -> float:
         return abs(intervals / likely - lasted)

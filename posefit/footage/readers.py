@@ -41,10 +41,10 @@ from posefit.limits import RATES, check_decoded
 from posefit.reading import existing, quoted
 
 ARRAYS = (".npz", ".npy")  # files of masks
-PACKED = 2_000_000_000  # largest .npz file that is opened, in bytes
-NAMES = ("masks", "valid", "usable", "fps", "first", "landmarks")  # keys of an .npz
-LAST = 1_000_000_000  # largest number of a frame; larger ones are mistakes
-# by name, as in `NAMES`; only `masks` is required
+MAX_PACKED_BYTES = 2_000_000_000  # largest .npz file that is opened, in bytes
+KEYS = ("masks", "valid", "usable", "fps", "first", "landmarks")  # keys of an .npz
+MAX_NUMBER = 1_000_000_000  # largest number of a frame; larger ones are mistakes
+# by name, as in `KEYS`; only `masks` is required
 Arrays = Mapping[str, Stored | NDArray[Any]]
 
 
@@ -63,16 +63,16 @@ def read_npy(path: Path, frames: Range, label: int | None, fps: float | None) ->
 
 
 def read_npz(path: Path, frames: Range, label: int | None, fps: float | None) -> View:
-    """Return the view of an .npz file, which may have the keys `NAMES`."""
+    """Return the view of an .npz file, which may have any of `KEYS`."""
     existing(path)
-    with archived(path, NAMES, "the key masks", PACKED, single=True) as arrays:
+    with archived(path, KEYS, "the key masks", MAX_PACKED_BYTES, single=True) as arrays:
         check_decoded(str(path), sum(array.nbytes for array in arrays.values()))
         return view_of(str(path), arrays, frames, label, fps)
 
 
 def first_number(path: Path) -> int:
     """Return the number of the first frame that an .npz file states; 0 by default."""
-    with archived(path, NAMES, "the key masks", PACKED, single=True) as arrays:
+    with archived(path, KEYS, "the key masks", MAX_PACKED_BYTES, single=True) as arrays:
         return _stated_first(str(path), arrays)
 
 
@@ -155,7 +155,7 @@ def view_of(
     label: int | None,
     rate: float | None,
 ) -> View:
-    """Return the view of arrays of masks, named as in `NAMES`.
+    """Return the view of arrays of masks, named as in `KEYS`.
 
     This is what the reader of a new kind of file calls once it has decoded the masks.
 
@@ -217,9 +217,10 @@ def _stated_rate(name: str, arrays: Arrays) -> float | None:
 def _stated_first(name: str, arrays: Arrays) -> int:
     """Return the number of the first frame that arrays state; 0 by default."""
     first = int(np.asarray(arrays["first"])) if "first" in arrays else 0
-    if not 0 <= first <= LAST:
+    if not 0 <= first <= MAX_NUMBER:
         raise InputError(
-            f"{name}: first must be the number of a frame up to {LAST:,}, got {first}"
+            f"{name}: first must be the number of a frame up to {MAX_NUMBER:,}, "
+            f"got {first}"
         )
     return first
 
@@ -254,7 +255,7 @@ def _stated_landmarks(name: str, arrays: Arrays, start: int, stop: int) -> Array
 
 # height over width: a picture of a standing person may be upright, but a narrower array
 # has its axes in another order
-NARROW = 4
+MAX_NARROWNESS = 4
 
 
 def _checked_stack(name: str, arrays: Arrays) -> Stored | NDArray[Any]:
@@ -271,7 +272,7 @@ def _checked_stack(name: str, arrays: Arrays) -> Stored | NDArray[Any]:
             f"got {_described(stack)}"
         )
     count, height, width = shape
-    if width * NARROW < height:
+    if width * MAX_NARROWNESS < height:
         raise InputError(
             f"{name}: masks must have shape (frames, height, width), "
             f"got {width} as the width of {shape}"

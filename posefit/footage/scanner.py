@@ -136,11 +136,11 @@ class Scanner:
         """
         for k, image in enumerate(self.video.frames(self.start, self.stop)):
             given = image if changed is None else changed(k, image)
-            found = self.segmenter.frame(given)
+            segmented = self.segmenter.frame(given)
             if watch is not None:
                 # here, because it may use the segmenter, too
-                watch(k, found.people)
-            yield image, found
+                watch(k, segmented.people)
+            yield image, segmented
 
 
 class _Rows:

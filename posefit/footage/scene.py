@@ -165,13 +165,15 @@ def observed_views(scene: Scene) -> list[View]:
     usable = np.array([each.usable for each in observations])
     views = list[View]()
     for k, camera in enumerate(scene.cameras):
-        seen = [each.silhouettes[k] for each in observations]
+        silhouettes = [each.silhouettes[k] for each in observations]
         view = View(
             name=scene.name,
             numbers=numbers,
             times=times_of(numbers, scene.fps),
-            bits=np.array([np.packbits(silhouette.mask) for silhouette in seen]),
-            known=np.array([np.packbits(silhouette.valid) for silhouette in seen]),
+            bits=np.array([np.packbits(silhouette.mask) for silhouette in silhouettes]),
+            known=np.array(
+                [np.packbits(silhouette.valid) for silhouette in silhouettes]
+            ),
             usable=usable,
             size=(camera.width, camera.height),
             fps=scene.fps,

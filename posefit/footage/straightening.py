@@ -106,7 +106,7 @@ def straightening(
         InputError: The masks are not from this camera.
 
     """
-    said = list[str]()
+    notes = list[str]()
     lens = Calibration.of(known, "") if isinstance(known, Camera) else known
     if isinstance(known, Camera) and (known.width, known.height) == size:
         camera = known
@@ -118,17 +118,17 @@ def straightening(
             world = np.eye(3)
         camera = lens.in_metres(metres).camera(size, world)
         if stated not in (None, filmed or size):
-            said.append(_resized(known, filmed or size))
+            notes.append(_resized(known, filmed or size))
     square = camera.squared()
     if square is not camera:
         ratio = camera.focal[0] / camera.focal[1]
-        said.append(
+        notes.append(
             f"pixels are not square, fx is {ratio:.3g} fy: {size[0]}x{size[1]} becomes "
             f"{square.width}x{square.height}"
         )
     if square is camera and not lens.distorted:
-        return camera, None, said
-    return square, Straightening(square, lens, lens.maps(size, square)), said
+        return camera, None, notes
+    return square, Straightening(square, lens, lens.maps(size, square)), notes
 
 
 def _resized(known: Camera | Calibration, size: tuple[int, int]) -> str:

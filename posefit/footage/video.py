@@ -27,11 +27,11 @@ from posefit.motion.clips import FPS
 from posefit.silhouette.foreground import Image
 
 Item = TypeVar("Item")
-HEAD = 2_000  # bytes at the beginning of a file that tell whether it is text
-SQUARE = 0.02  # share by which the sides of a pixel may differ and count as equal
+HEAD_BYTES = 2_000  # bytes at the beginning of a file that tell whether it is text
+SQUARE_SHARE = 0.02  # share by which the sides of a pixel may differ and count as equal
 MAX_RATE = 1_000.0  # frames per second: files that state more do not know their rate
 MAX_CLAIMED = 1e9  # frames: files that state more do not know their length
-AHEAD = 2  # frames that are decoded while earlier ones are in use
+FRAMES_AHEAD = 2  # frames that are decoded while earlier ones are in use
 # posefit reports once what is wrong with a file. A user may set the variable to see
 # FFmpeg's own messages
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
@@ -85,7 +85,7 @@ class Video:
         order, filmed, rate = even(_moments(path, head.size, size, kept), stated)
         is_uneven = bool((np.diff(order) != 1).any())
         warnings = []
-        if head.aspect is not None and abs(head.aspect - 1.0) > SQUARE:
+        if head.aspect is not None and abs(head.aspect - 1.0) > SQUARE_SHARE:
             warnings.append(
                 f"{path}: its pixels are {head.aspect:.3g} times as wide as high, "
                 "which is not corrected: the person looks that much too slim"
@@ -323,7 +323,7 @@ def _check_no_text(path: Path) -> None:
     FFmpeg would take it for a playlist and open the files that it lists.
     """
     with path.open("rb") as file:
-        head = file.read(HEAD)
+        head = file.read(HEAD_BYTES)
     is_text = (
         head
         and not head.startswith(b"YUV4MPEG2")
@@ -439,7 +439,7 @@ def ahead(items: Iterator[Item]) -> Iterator[Item]:
     """
     end = object()
     with ThreadPoolExecutor(1) as pool:
-        waiting = deque(pool.submit(next, items, end) for _ in range(AHEAD))
+        waiting = deque(pool.submit(next, items, end) for _ in range(FRAMES_AHEAD))
         while (item := waiting.popleft().result()) is not end:
             waiting.append(pool.submit(next, items, end))
             yield cast(Item, item)

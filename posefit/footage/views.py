@@ -248,7 +248,7 @@ def release(planes: Planes, k: int, count: int = 1) -> None:
     # a slice of planes begins later in the file than the planes
     before = np.frombuffer(mapped, np.uint8, 1).ctypes.data
     start = planes[k].ctypes.data - before
-    # to read one page brings its neighbours too
+    # reading one page maps its neighbours, too
     first = max(start - READ_AROUND, 0) // mmap.PAGESIZE * mmap.PAGESIZE
     last = min(start + count * planes.shape[1] + READ_AROUND, len(mapped))
     mapped.madvise(mmap.MADV_DONTNEED, first, last - first)
@@ -299,11 +299,16 @@ def beyond(frames: Range, first: int, count: int) -> str:
     late = stop is not None and stop > first + count
     if not (early or late):
         return ""
-    low, high = ("" if value is None else value for value in frames)
     return (
-        f"frames {low}:{high} were chosen, and {first}:{first + count} are used: "
-        "there are no others"
+        f"frames {_range_text(frames)} were chosen, and {first}:{first + count} are "
+        "used: there are no others"
     )
+
+
+def _range_text(frames: Range) -> str:
+    """Return a range as a user writes it, such as 10: or 0:50."""
+    start, stop = ("" if end is None else end for end in frames)
+    return f"{start}:{stop}"
 
 
 def span(frames: Range, count: int, first: int = 0) -> tuple[int, int]:
@@ -326,9 +331,9 @@ def span(frames: Range, count: int, first: int = 0) -> tuple[int, int]:
         ends.append(end)
     start, stop, _ = slice(*ends).indices(count)
     if start >= stop:
-        low, high = ("" if value is None else value for value in frames)
         numbers = f" {first}:{first + count}" if first else ""
         raise InputError(
-            f"frames must contain one of the {count} frames{numbers}, got {low}:{high}"
+            f"frames must contain one of the {count} frames{numbers}, "
+            f"got {_range_text(frames)}"
         )
     return start, stop

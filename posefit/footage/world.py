@@ -14,13 +14,13 @@ from posefit.geometry.units import METRES, UNIT_NAMES, Unit
 from posefit.reading import quoted
 
 GUESSED_UNITS: Sequence[Unit] = ("m", "cm", "mm", "inch")
-# distance of a camera from its world's origin, in the calibration's unit. Above FAR the
-# unit cannot be metres, and above FARTHER not even centimetres
-FAR = 100.0
-FARTHER = 1000.0
+# greatest distance of a camera from its world's origin in metres, and in centimetres. A
+# larger number must be of a smaller unit
+METRES_REACH = 100.0
+CENTIMETRES_REACH = 1000.0
 # metres: a camera lower than this is probably a mistake, because the world's origin is
 # usually on the floor or in the first camera
-BELOW = 1.0
+MAX_BELOW = 1.0
 # a height of 0 or less, of a person behind a camera, would have no logarithm
 LEAST_HEIGHT = 1e-9
 
@@ -76,7 +76,7 @@ def world_of(
         place = calibration.in_metres(metres).position
         if place is not None:
             lowest = min(lowest, float(world[1] @ place))
-    if lowest < -BELOW:
+    if lowest < -MAX_BELOW:
         guesses["below"] = (
             f"a camera stands {-lowest:.1f} m below its world's origin: is its "
             "translation its place?"
@@ -87,9 +87,9 @@ def world_of(
 def _unit_of_distances(distances: Sequence[float]) -> Unit:
     """Return the likely unit of the cameras' distances from their world's origin."""
     farthest = max(distances)
-    if farthest <= FAR:
+    if farthest <= METRES_REACH:
         return "m"
-    return "cm" if farthest <= FARTHER else "mm"
+    return "cm" if farthest <= CENTIMETRES_REACH else "mm"
 
 
 def unit_of_heights(ratio: float) -> Unit:
