@@ -232,7 +232,10 @@ def _interrupted(path: Path, spec: Mapping[str, Digest]) -> Unfinished:
 
 
 def _unmarked(folder: Path) -> list[str]:
-    """Return the files of a folder, or nothing if its summary is one of a track."""
+    """Return the names of the files in a folder that has no summary of a track.
+
+    Empty if it has one, or if the folder is empty.
+    """
     names = sorted(entry.name for entry in folder.iterdir())
     try:
         summary = parsed_json(read_text(folder / SUMMARY, MAX_SUMMARY_BYTES))

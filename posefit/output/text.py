@@ -4,7 +4,7 @@ It compares the method with trivial ones, and names everything undetermined and 
 budget.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -54,14 +54,10 @@ def table(track: Content) -> str:
     lines = []
     if track.trust is not None:
         lines += [track.trust.sentence, trust_line(asdict(track.trust))]
-    names = setup.train
-    training = ", ".join(names)
-    if len(names) > MAX_NAMED:
-        training = f"{len(names)} clips, {names[0]} to {names[-1]}"
     frames = counted(setup.frames, "frame")
     lines.append(
         f"{setup.motion}: {frames}, {setup.method}, seed {setup.seed}, "
-        f"translation {setup.translation}, trained on {training}"
+        f"translation {setup.translation}, trained on {_training(setup.train)}"
     )
     lines += _error_lines(setup.method, measures)
     lines += filter(None, [held_frames(track), undetermined(track)])
@@ -74,18 +70,30 @@ def table(track: Content) -> str:
             "camera guessed: level, 40 degrees across; "
             "distances and size depend on this guess and on --height"
         )
-    if tracks := log.hypotheses:
-        chosen = ""
-        costs = []
-        for number, hypothesis in enumerate(tracks, 1):
-            cost = hypothesis["cost"] + hypothesis["motion"]
-            costs.append(f"{hypothesis['guess']} {cost:.2f}")
-            if hypothesis["kept"]:
-                chosen = f"kept track {number} of {len(tracks)}"
-        lines.append(f"{chosen}; trajectory cost by initial guess: {', '.join(costs)}")
+    if log.hypotheses:
+        lines.append(_hypotheses_line(log.hypotheses))
     speed = MEASURES["evaluations_per_second"].number(measures.evaluations_per_second)
     lines.append(f"{_effort(track)}, {speed} poses a second")
     return "\n".join(map(printable, lines))  # the lines may have names of files
+
+
+def _training(names: Sequence[str]) -> str:
+    """Return the names of training motions, or the number of many."""
+    if len(names) > MAX_NAMED:
+        return f"{len(names)} clips, {names[0]} to {names[-1]}"
+    return ", ".join(names)
+
+
+def _hypotheses_line(hypotheses: Sequence[Mapping[str, Any]]) -> str:
+    """Return which hypothesis is kept, and the costs of all."""
+    kept = ""
+    costs = []
+    for number, hypothesis in enumerate(hypotheses, 1):
+        cost = hypothesis["cost"] + hypothesis["motion"]
+        costs.append(f"{hypothesis['guess']} {cost:.2f}")
+        if hypothesis["kept"]:
+            kept = f"kept track {number} of {len(hypotheses)}"
+    return f"{kept}; trajectory cost by initial guess: {', '.join(costs)}"
 
 
 def _error_lines(method: str, measures: Measures) -> list[str]:
@@ -137,31 +145,33 @@ def undetermined(track: Content) -> str:
     """Return one sentence about everything that a method left undetermined, or ""."""
     parts = []
     words = {"unknown_sides": "left and right unknown in", "lost": "lost in"}
-    for name, verb in words.items():
+    for name, flag in words.items():
         frames = flagged(track.table, name)
         if frames is not None and frames.frames.any():
-            parts.append(f"{verb} {frames.frames.sum()} of {frames.known}")
+            parts.append(f"{flag} {frames.frames.sum()} of {frames.known}")
     if not parts:
         return ""
     return f"{', '.join(parts)} frames that show enough of the person"
 
 
 def gait_line(gait: Mapping[str, Any], *, by_side: bool = True) -> str:
-    """Return one line about the gait, or why there are no figures of it."""
+    """Return one line about the gait, or why there are no figures of it.
+
+    With `by_side` it begins with "gait:" and has the figures of both feet.
+    """
     if not gait["walk"]:
         return f"no figures of gait: {gait['why']}"
     speed = ""
     if gait["speed"] is not None:
         speed = f", {gait['speed']:.2f} m/s"
-    by_label = []
-    for label, unit, left, right in gait_rows(gait):
-        by_label.append(f"{label} {left} and {right} {unit}")
-    sides = ", ".join(by_label)
-    label = "gait: " if by_side else ""
     cadence = f"{gait['cadence']:.0f} steps a minute"
-    parts = [f"{label}{cadence}{speed}, over {gait['steps']} steps"]
+    parts = [f"{cadence}{speed}, over {gait['steps']} steps"]
     if by_side:
-        parts.append(f"left and right: {sides}")
+        parts[0] = f"gait: {parts[0]}"
+        sides = []
+        for label, unit, left, right in gait_rows(gait):
+            sides.append(f"{label} {left} and {right} {unit}")
+        parts.append(f"left and right: {', '.join(sides)}")
     if gait["why_no_lengths"]:
         parts.append(f"no lengths: {gait['why_no_lengths']}")
     return "; ".join(parts)
@@ -200,15 +210,15 @@ def _effort(track: Content) -> str:
     seconds = MEASURES["seconds_per_frame"].number(measures.seconds_per_frame)
     budget = setup.evaluations_per_frame * max(len(track.log.hypotheses), 1)
     effort = measures.effort or {"frames": measures.evaluations}
-    frame = effort["frames"] / setup.frames
+    per_frame = effort["frames"] / setup.frames
     # no budget is named if frames were searched again and so used more than one
-    of = f" of {budget:,}" if frame <= budget else ""
-    others = []
+    of_budget = f" of {budget:,}" if per_frame <= budget else ""
+    stages = []
     for stage, count in effort.items():
         if stage != "frames":
-            others.append(f"{count:,} for the {stage.replace('_', ' ')}")
-    besides = f" (and {', '.join(others)})" if others else ""
-    evaluations = f"{frame:,.0f}{of} evaluations{besides}"
+            stages.append(f"{count:,} for the {stage.replace('_', ' ')}")
+    other_stages = f" (and {', '.join(stages)})" if stages else ""
+    evaluations = f"{per_frame:,.0f}{of_budget} evaluations{other_stages}"
     return f"{_shown(measures, 'iou')}, {evaluations} and {seconds} ms a frame"
 
 

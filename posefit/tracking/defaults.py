@@ -3,6 +3,8 @@
 The functions that it calls get complete options.
 """
 
+from typing import Any
+
 from posefit.errors import InputError
 from posefit.motion import built_in, recorded
 from posefit.motion.clips import Source
@@ -41,17 +43,7 @@ def completed(options: TrackOptions, motion: Source | None) -> TrackOptions:
     """
     footage = motion is None
     name = motion if isinstance(motion, str) and motion in built_in.names() else None
-    method = options.method
-    offers = registry().offers
-    set_names = {setting.partition(".")[0] for setting in options.settings}
-    settings_fit = not set_names - {DEFAULT_TRACKER}
-    installed = DEFAULT_TRACKER in offers["tracker"]
-    if method is None and name is None and settings_fit and installed:
-        method = DEFAULT_TRACKER
-    elif method is None or isinstance(method, str):
-        optimiser = next(iter(set_names & {*offers["optimiser"]}), "@")
-        prior = DEFAULT_FOOTAGE_PRIOR if footage else DEFAULT_PRIOR
-        method = str(method_names(method or optimiser, prior))
+    method = _method(options, footage, name)
     by_default = method == DEFAULT_TRACKER
     styles = built_in.other_styles(name or "walk")
     body_frames = BODY_FRAMES if footage and options.asf is None else 0
@@ -73,3 +65,27 @@ def completed(options: TrackOptions, motion: Source | None) -> TrackOptions:
             "smooth needs a translation that is searched or aligned, got known"
         )
     return options
+
+
+def _method(options: TrackOptions, footage: bool, built_in_name: str | None) -> Any:
+    """Return the method of a track: a name with its prior, or what the user gave.
+
+    Args:
+        options: The options that the user chose.
+        footage: Whether footage is tracked.
+        built_in_name: The name of the built-in motion that is tracked, or None.
+
+    """
+    method = options.method
+    offers = registry().offers
+    # settings of other plugins than the default tracker choose another method
+    plugins = {setting.partition(".")[0] for setting in options.settings}
+    settings_fit = not plugins - {DEFAULT_TRACKER}
+    installed = DEFAULT_TRACKER in offers["tracker"]
+    if method is None and built_in_name is None and settings_fit and installed:
+        return DEFAULT_TRACKER
+    if method is not None and not isinstance(method, str):
+        return method
+    optimiser = next(iter(plugins & {*offers["optimiser"]}), "@")
+    prior = DEFAULT_FOOTAGE_PRIOR if footage else DEFAULT_PRIOR
+    return str(method_names(method or optimiser, prior))

@@ -50,16 +50,14 @@ def evaluate(
     """
     skeleton = scene.body.skeleton
     height_known = options.height is not None
-    posteriors = []
+    finished = list[Frame]()
     for frame in frames:
-        posterior = frame.posterior
-        if posterior is not None:
-            posterior = _finished(scene, posterior, height_known)
-        posteriors.append(posterior)
-    frames = [
-        replace(frame, posterior=posterior)
-        for frame, posterior in zip(frames, posteriors, strict=True)
-    ]
+        if frame.posterior is not None:
+            posterior = _finished(scene, frame.posterior, height_known)
+            frame = replace(frame, posterior=posterior)
+        finished.append(frame)
+    frames = finished
+    posteriors = [frame.posterior for frame in frames]
     training = None if scene.truth is None else task.angles
     table, measures = evaluated(
         scene, frames, method.prior, training, method.audit.beta, effort
@@ -75,9 +73,10 @@ def evaluate(
     if scene.truth is None and (warning := backwards_warning(backwards)):
         warnings.append(warning)
     modes = track_modes(skeleton, posteriors)
-    outside = tracked.stay
-    if outside:
-        outside = (scene.first + outside[0], scene.first + outside[1])
+    stay = None
+    if tracked.stay is not None:
+        first, last = tracked.stay
+        stay = scene.first + first, scene.first + last
     log = TrackingLog(
         hypotheses=tracked.hypotheses,
         build=None if shape is None else shape.as_dict(),
@@ -87,7 +86,7 @@ def evaluate(
         unknown_sides=_numbers(table, "unknown_sides"),
         lost_frames=_numbers(table, "lost"),
         relocalised=_relocalised(scene, frames),
-        retracked_outside=outside,
+        retracked_outside=stay,
         backwards_share=round(float(backwards.mean()), 6),
         warnings=warnings,
         guesses=[*scene.guesses],
@@ -153,6 +152,6 @@ def _finished(scene: Scene, posterior: Posterior, height_known: bool) -> Posteri
 
 
 def _numbers(table: Table, name: str) -> list[int] | None:
-    """Return the numbers of the flagged frames, or None if it is known of none."""
+    """Return the numbers of the flagged frames, or None if all are unknown."""
     frames = flagged(table, name)
     return None if frames is None else table["frame"][frames.frames].tolist()

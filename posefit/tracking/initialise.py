@@ -91,35 +91,47 @@ def initialise(
     # a single picture is one search, by the tracker itself
     if scene.count == 1:
         if method.prior is not None and task.start is not None:
-            shown = next(iter(scene.observations))
-            modes, used = guessed(task, shown)
+            observation = next(iter(scene.observations))
+            modes, used = guessed(task, observation)
             effort["first_pose"] = used
-            left = task.evaluations - used
-            task = replace(task, modes=modes, start=None, evaluations=left)
+            remaining = task.evaluations - used
+            task = replace(task, modes=modes, start=None, evaluations=remaining)
         return Initialised(task, None, start, effort)
-    body_frames = options.body_frames or 0
     if options.restarts:
-        searched = scene.observations, method.follow, options.restarts, options.seed
-        task, tried = best_restart(task, *searched, log=progress.log)
+        task, tried = best_restart(
+            task,
+            scene.observations,
+            method.follow,
+            options.restarts,
+            options.seed,
+            log=progress.log,
+        )
         effort["first_pose"] = sum(frame.evaluations for frame in tried)
+    body_frames = options.body_frames or 0
     count = len(usable_observations(scene.observations, body_frames))
     if body_frames and count < MIN_BODY_FRAMES:
-        few = (
-            f"{count} of them show enough of the person"
-            if count < body_frames
-            else f"{count} are too few"
-        )
+        few = f"{count} are too few"
+        if count < body_frames:
+            few = f"{count} of them show enough of the person"
         needed = f"at least {MIN_BODY_FRAMES} are needed; it is the average"
         progress.log(f"no build is fitted to {body_frames} frames: {few}, {needed}")
     elif body_frames:
         progress.log(f"fitting the person's build to {body_frames} frames")
-        alone = len(scene.cameras) == 1 and task.translation == "aligned"
-        height = options.height or (task.body.stature if alone else None)
-        fitted = scene, method.follow, body_frames, height, options.seed
+        height = options.height
+        # the masks of one camera do not show how tall a person is at what distance
+        if height is None and len(scene.cameras) == 1 and task.translation == "aligned":
+            height = task.body.stature
         drawn = PoseCount()
         with drawn.counting():
             shape, cameras = fitted_build(
-                task, *fitted, beta=method.audit.beta, restarts=options.restarts or 0
+                task,
+                scene,
+                method.follow,
+                body_frames,
+                height,
+                options.seed,
+                beta=method.audit.beta,
+                restarts=options.restarts or 0,
             )
         effort["build"] = round(drawn.poses / len(scene.cameras))
         task = replace(task, body=shape.body, cameras=cameras)
@@ -151,11 +163,6 @@ def fitted_build(
 
     Several calibrated cameras are turned a little so that their masks agree.
 
-    The frames start from the one that shows most: a person who enters the picture is
-    cut, and visible to few cameras. By then they may have turned away from the first
-    pose of the task. If that frame is later than `NEAR_SECONDS`, the pose is searched
-    again.
-
     Args:
         task: The task, with the first pose.
         scene: The scene.
@@ -170,24 +177,9 @@ def fitted_build(
         The build, and the cameras.
 
     """
-    observations = scene.observations
-    stride = TRIAL_STRIDE
-    whole = first_shown_whole(scene.observations)
-    usable = (k for k, observation in enumerate(observations) if observation.usable)
-    first = next(usable, 0)
-    chosen = usable_observations(observations, frames, stride, whole)
-    if len(chosen) < frames:
-        chosen = usable_observations(observations, frames)
-        stride = 1
-    elif whole - first > NEAR_SECONDS * task.fps:
-        task = replace(
-            task, yaw=observations[whole].yaw, first_pose=None, modes=(), before=()
-        )
-        if restarts:
-            reach = min(whole + TRIAL_FRAMES * TRIAL_STRIDE, len(observations))
-            ahead = [observations[k] for k in range(whole, reach)]
-            task, _ = best_restart(task, ahead, follow, restarts, seed)
-    task = replace(task, fps=task.fps / stride)
+    task, chosen = _build_frames(
+        task, scene.observations, follow, frames, seed, restarts
+    )
 
     def frames_of(body: Body) -> list[Frame]:
         """Return the chosen frames, tracked with a body."""
@@ -221,6 +213,39 @@ def fitted_build(
         threads=task.threads,
     )
     return shape, task.cameras
+
+
+def _build_frames(
+    task: Task,
+    observations: Sequence[Observation],
+    follow: Follow,
+    frames: int,
+    seed: int,
+    restarts: int,
+) -> tuple[Task, list[Observation]]:
+    """Return the frames to which a build is fitted, and the task of tracking them.
+
+    The frames start from the one that shows most: a person who enters the picture is
+    cut, and visible to few cameras. By then they may have turned away from the first
+    pose of the task. If that frame is later than `NEAR_SECONDS`, the pose is searched
+    again.
+
+    The arguments are those of `fitted_build`.
+    """
+    whole = first_shown_whole(observations)
+    chosen = usable_observations(observations, frames, TRIAL_STRIDE, whole)
+    if len(chosen) < frames:
+        return task, usable_observations(observations, frames)
+    usable = (k for k, observation in enumerate(observations) if observation.usable)
+    if whole - next(usable, 0) > NEAR_SECONDS * task.fps:
+        task = replace(
+            task, yaw=observations[whole].yaw, first_pose=None, modes=(), before=()
+        )
+        if restarts:
+            reach = min(whole + TRIAL_FRAMES * TRIAL_STRIDE, len(observations))
+            ahead = [observations[k] for k in range(whole, reach)]
+            task, _ = best_restart(task, ahead, follow, restarts, seed)
+    return replace(task, fps=task.fps / TRIAL_STRIDE), chosen
 
 
 def compile_for(scene: Scene, task: Task) -> None:

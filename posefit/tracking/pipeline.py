@@ -98,8 +98,8 @@ def with_turns(scene: Scene, calibrated: Sequence[Camera]) -> Scene:
         np.degrees(geodesic(camera.rotation, other.rotation))
         for camera, other in cameras
     ]
-    said = ", ".join(f"{each:.2f}" for each in degrees)
-    guess = f"cameras turned by {said} degrees, so that their masks agree"
+    angles = ", ".join(f"{angle:.2f}" for angle in degrees)
+    guess = f"cameras turned by {angles} degrees, so that their masks agree"
     return replace(scene, guesses=[*scene.guesses, guess])
 
 
@@ -427,7 +427,7 @@ class _Budget(NamedTuple):
 def _budget(
     scene: Scene, method: Method, evaluations: int, options: TrackOptions
 ) -> _Budget:
-    """Return the budget of a track with so many evaluations per frame."""
+    """Return how a track divides its evaluations per frame."""
     passes = _passes(scene, method, evaluations, bool(options.smooth))
     in_pass = evaluations // passes
     polishing = _polish_evaluations(scene, method, in_pass, options)
@@ -519,8 +519,10 @@ def _starts_over(method: Method, recorded: Sequence[Frame]) -> bool:
 
     It is lost for a tracker, and for a filter with a state that cannot be recorded.
     """
-    kept = [frame.details[CARRIED] for frame in recorded if CARRIED in frame.details]
-    return method.prior is None or (bool(kept) and not kept[-1])
+    if method.prior is None:
+        return True
+    states = [frame.details[CARRIED] for frame in recorded if CARRIED in frame.details]
+    return bool(states) and not states[-1]
 
 
 def _resumed(
@@ -537,14 +539,12 @@ def _resumed(
 
     """
     hypothesis.rng.bit_generator.state = state
-    posteriors = [
-        frame.posterior and replace(frame.posterior, coherent=False)
-        for frame in recorded
-    ]
-    frames = [
-        replace(frame, posterior=posterior)
-        for frame, posterior in zip(recorded, posteriors, strict=True)
-    ]
+    frames = list[Frame]()
+    for frame in recorded:
+        if frame.posterior is not None:
+            posterior = replace(frame.posterior, coherent=False)
+            frame = replace(frame, posterior=posterior)
+        frames.append(frame)
     pose = frames[-1].pose
     task = replace(
         hypothesis.task, yaw=float(pose[0]), first_pose=pose[3:], before=tuple(frames)

@@ -30,12 +30,12 @@ from posefit.silhouette.cost import known_views, pose_costs
 from posefit.tracking.initialise import guessed
 from posefit.uncertainty.modes import APART, Posterior, poses_apart
 
-SHARE = 0.5  # the share of a frame's evaluations that is for polishing
-# standard deviations of a searched pose's errors, in radians and in metres
-TURN = np.radians(8.0)
-SHIFT = 0.05
+POLISH_SHARE = 0.5  # the share of a frame's evaluations that is for polishing
+# standard deviations of the errors of a search, in radians and in metres
+SEARCH_TURN = np.radians(8.0)
+SEARCH_SHIFT = 0.05
 # a look-up leaves at least this share of the evaluations for polishing
-LOOKED_SHARE = 0.9
+AFTER_LOOKUP_SHARE = 0.9
 
 
 def polish_evaluations(evaluations: int) -> int:
@@ -43,8 +43,8 @@ def polish_evaluations(evaluations: int) -> int:
 
     It is 0 if they do not suffice for one pose.
     """
-    share = int(SHARE * evaluations)
-    return share if race_count(LOOKED_SHARE * share) else 0
+    share = int(POLISH_SHARE * evaluations)
+    return share if race_count(AFTER_LOOKUP_SHARE * share) else 0
 
 
 @lru_cache(maxsize=1)
@@ -106,7 +106,12 @@ def polished(
     ]
     start = poses, places
     poses, places, used = contour_race(
-        task.body, views, start, precisions(TURN, SHIFT), cost, task.threads
+        task.body,
+        views,
+        start,
+        precisions(SEARCH_TURN, SEARCH_SHIFT),
+        cost,
+        task.threads,
     )
     costs, areas = pose_costs(*scene, poses, places, beta)
     best = int(costs.argmin())

@@ -178,13 +178,7 @@ def best_restart(
     if factor > 1:
         cameras = [coarser_camera(camera, factor) for camera in task.cameras]
         trial = replace(trial, cameras=cameras)
-        compared = []
-        for observation in chosen:
-            small = [
-                coarser_silhouette(silhouette, factor)
-                for silhouette in observation.silhouettes
-            ]
-            compared.append(replace(observation, silhouettes=small))
+        compared = [_coarser(observation, factor) for observation in chosen]
     prefix = [seed] if isinstance(seed, int) else [*seed]
     best = continuation or task
     least = np.inf
@@ -218,6 +212,14 @@ def best_restart(
         tried.append(next(follow(best, chosen[:1], rng)))
         best = after(task, tried[-1])
     return best, tried
+
+
+def _coarser(observation: Observation, factor: int) -> Observation:
+    """Return an observation whose pictures have a fraction of the rows and columns."""
+    silhouettes = [
+        coarser_silhouette(silhouette, factor) for silhouette in observation.silhouettes
+    ]
+    return replace(observation, silhouettes=silhouettes)
 
 
 def _trial_cost(frames: Sequence[Frame]) -> float:
@@ -433,8 +435,9 @@ def initial_guess(
 
 
 # After the last frame. A silhouette hardly distinguishes a body that faces the camera
-# from its reflection, which faces away. A track that takes one for the other and back
-# spins. Each of its frames then votes for one of the two.
+# from its reflection, which faces away. A track that confuses the two for a while spins
+# when it changes over, and when it changes back. Each of its frames then votes for one
+# of the two.
 
 
 def retrack_spins(
@@ -475,10 +478,10 @@ def retrack_spins(
     before = spins(frames)
     if not before:
         return tracked
-    every = runs(facing_consensus(frames, task.cameras, usable, task.fps))
-    if not every:
+    steady_runs = runs(facing_consensus(frames, task.cameras, usable, task.fps))
+    if not steady_runs:
         return tracked
-    longest = max(every, key=lambda run: run[1] - run[0])
+    longest = max(steady_runs, key=lambda run: run[1] - run[0])
     stay = best_ends(frames, *longest, task.fps)
     first, last = stay
     steady = replace(task, fastest_turn=MAX_TURN_RATE)

@@ -99,12 +99,12 @@ def with_effort_of(frame: Frame, together: Sequence[Frame]) -> Frame:
     The evaluations in the trace of its search are stretched to the total, as if all
     searches ran in parallel.
     """
-    seconds, cpu_seconds = (
-        sum(getattr(each, name) for each in together)
-        for name in ("seconds", "cpu_seconds")
-    )
     frame = with_evaluations(frame, sum(each.evaluations for each in together))
-    return replace(frame, seconds=seconds, cpu_seconds=cpu_seconds)
+    return replace(
+        frame,
+        seconds=sum(each.seconds for each in together),
+        cpu_seconds=sum(each.cpu_seconds for each in together),
+    )
 
 
 def with_total_effort(tracks: Sequence[Sequence[Frame]], best: int) -> list[Frame]:
@@ -129,15 +129,15 @@ def cheapest(
         for frames in tracks
     ]
     best = min(range(len(costs)), key=lambda k: costs[k].total)
-    table = [
-        {
+    table = list[dict[str, Any]]()
+    for k, (hypothesis, cost) in enumerate(zip(hypotheses, costs, strict=True)):
+        row = {
             "guess": hypothesis.guess,
             "cost": cost.cost,
             "motion": cost.motion,
             "kept": k == best,
         }
-        for k, (hypothesis, cost) in enumerate(zip(hypotheses, costs, strict=True))
-    ]
+        table.append(row)
     return Tracked(with_total_effort(tracks, best), table)
 
 
