@@ -10,7 +10,7 @@ hypotheses. Both are cheapest paths, with these costs:
 | hypotheses | `HypothesisCosts.of_poses`, landmarks | `HypothesisCosts.of_steps` |
 
 `frame_costs` compares poses with silhouettes and landmarks, and `proposals` reaches new
-states at the prices of `ClipSteps`. docs/studies/ablate.py measures the effect of each
+states at the costs of `ClipSteps`. docs/studies/ablate.py measures the effect of each
 cost.
 """
 

@@ -29,7 +29,7 @@ from posefit_exemplars.hypotheses import SAME_DISTANCE
 # Metres, for each step of a fit. Contours that are farther away count less.
 FRESH_REACHES = ROBUST_SCALES[:8]
 # The first step of a hypothesis that continues reaches farther, because a limb may have
-# left the way that it had.
+# changed its motion.
 CONTINUED_REACHES = (0.15, *FRESH_REACHES[1::2])
 START_TURN = np.radians(8.0)  # standard deviation of an angle from the start of a fit
 # Standard deviations of the root from its start, metres.
@@ -59,7 +59,7 @@ def continued_evaluations() -> float:
 def library_precisions(noise: float) -> Array:
     """Return the precisions (69,) of the mean of similar poses of clips.
 
-    It says nothing of the place and of the yaw, and says more if masks are noisy.
+    The mean does not pull the place and the yaw. It pulls harder if masks are noisy.
     """
     pulls = precisions(SAME_TURN / noise, np.inf)
     pulls[3] = 0.0
@@ -96,7 +96,7 @@ class FrameFits:
         self._contours: list[MaskContours] = frame_costs.contours(place)
         self._noise = noise
         shift = ALIGNED_SHIFT if frame_costs.root is None else KNOWN_SHIFT
-        # noisy masks say less, and so the start more
+        # the noisier the masks are, the more the start counts
         self._weights = precisions(START_TURN / noise, shift)  # (69,)
         self.evaluations = 0.0
 

@@ -81,9 +81,6 @@ class Hypotheses(NamedTuple):
         return poses, places
 
     def squares_from(self, row: int) -> Array:
-        """Return the mean squared distances (n,) of joints from those of one of them.
-
-        The distances are in metres.
-        """
+        """Return the mean squared distances (n,) of joints from one row's, metres^2."""
         offsets = self.joints - self.joints[row]  # (n, 27, 3)
         return np.asarray((offsets**2).sum(axis=2).mean(axis=1))

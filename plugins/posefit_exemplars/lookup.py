@@ -54,7 +54,7 @@ Codes = NDArray[np.float32]  # (n, DIMENSIONS)
 
 
 class Table(NamedTuple):
-    """The codes of silhouettes: states turned to `YAWS` yaws, the camera in front.
+    """The codes of the silhouettes of states, each turned to `YAWS` yaws.
 
     The camera sees a person of yaw 0 from the front.
     """
@@ -254,7 +254,7 @@ class Lookup:
     def posterior(self, observation: Observation) -> Posterior | None:
         """Return the poses that a frame may show, with weights.
 
-        None if no pose has similar silhouettes, or if the budget is too small to
+        It is None if no pose has similar silhouettes, or if the budget is too small to
         compare even one.
         """
         if not observation.usable:

@@ -58,18 +58,13 @@ def cleaned(
         holes = MAX_HOLE_AREA if count > 1 else MAX_HOLE_ALONE
     usable = view.usable & view.shows
     if not usable.any():
-        came = "one without background" if view.bits[0].any() else "an empty one"
-        rest = f" first, and no other in {count}" if count > 1 else ""
-        raise InputError(
-            f"{view.name}: expected a mask with a person before a background, "
-            f"got {came}{rest}"
-        )
+        raise _no_person(view)
     people = People(view.fps or FPS)
     bits = empty_planes(count, view.size)
     areas = np.zeros(count)
     cut = np.zeros(count, dtype=bool)
 
-    def put(k: int, mask: Mask) -> None:
+    def store(k: int, mask: Mask) -> None:
         bits[k] = np.packbits(mask)
         release(bits, k)
         areas[k] = mask.sum()
@@ -80,18 +75,18 @@ def cleaned(
         masks = _people(silhouette) if usable[k] else []
         people.add(masks)
         mask = without_holes(masks[0], holes) if masks else silhouette.mask
-        put(k, mask & silhouette.valid)
-    parts, words = people.chosen(choice, lambda frame: f"frame {view.numbers[frame]}")
+        store(k, mask & silhouette.valid)
+    parts, several = people.chosen(choice, lambda frame: f"frame {view.numbers[frame]}")
     known = view.known
-    if words:
-        warnings.append(f"{view.name}: {words}")
+    if several:
+        warnings.append(f"{view.name}: {several}")
         before = full_planes(count, view.size) if known is None else known
         known = empty_planes(count, view.size)
         known[:] = before
         others = people.others(parts)
         for k in np.flatnonzero(usable).tolist():
             mask, valid = planes_of(parts, others, k, unpacked(before[k], view.size))
-            put(k, without_holes(mask, holes) & valid)
+            store(k, without_holes(mask, holes) & valid)
             known[k] = np.packbits(valid)
             release(known, k)
     usable = usable & (areas > 0)
@@ -104,9 +99,23 @@ def cleaned(
     )
 
 
+def _no_person(view: View) -> InputError:
+    """Return the error for a view in which no usable mask shows a person."""
+    count = len(view)
+    came = "one without background" if view.bits[0].any() else "an empty one"
+    rest = f" first, and no other in {count}" if count > 1 else ""
+    return InputError(
+        f"{view.name}: expected a mask with a person before a background, "
+        f"got {came}{rest}"
+    )
+
+
 def _silhouette(view: View, k: int, inverted: bool) -> Silhouette:
+    """Return the silhouette of a frame; `inverted` masks are inverted again."""
     silhouette = view.silhouette(k)
-    return Silhouette.of(~silhouette.mask, silhouette.valid) if inverted else silhouette
+    if inverted:
+        return Silhouette.of(~silhouette.mask, silhouette.valid)
+    return silhouette
 
 
 def _people(silhouette: Silhouette) -> list[Mask]:
@@ -138,7 +147,7 @@ def _shows_enough(
         return enough
     frames = np.flatnonzero(usable & cut)
     later = np.searchsorted(whole, frames).clip(1, len(whole) - 1)
-    # of two that are equally near the earlier one counts
+    # of two equally near frames, the earlier one counts
     is_earlier = frames - whole[later - 1] <= whole[later] - frames
     nearest = whole[np.where(is_earlier, later - 1, later)]
     enough[frames] = areas[frames] >= MOST * areas[nearest]

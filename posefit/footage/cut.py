@@ -1,7 +1,6 @@
 """Refuse a film soon if the picture's border cuts the person in all of its frames.
 
-A pass by a segmenter is refused then in any case, see `quality.verdict`, but only after
-all frames.
+`quality.verdict` refuses such a film, too, but only after all of its frames.
 """
 
 from collections.abc import Sequence
@@ -59,7 +58,8 @@ class CutWatch:
         scanner = self._scanner
         segmenter = scanner.segmenter
         if not registry().offer("segmenter", scanner.how.name).still_background:
-            # a network follows people: the pass's own is left as it is
+            # a network follows people from frame to frame: the pass's own must not get
+            # frames out of order
             segmenter = PersonSegmenter(scanner.video, scanner.how)
         cut = self._cut
         looked = start  # frames looked at, with those before

@@ -23,7 +23,7 @@ class KeptFrames:
 
     They are in a file, because even a short film would double the memory of a track.
     Packed with zlib they would take a fifth of the room, but packing and unpacking take
-    longer than to decode most films again.
+    longer than decoding most films again.
     """
 
     def __init__(self, size: tuple[int, int], wanted: Container[int]) -> None:

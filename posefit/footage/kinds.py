@@ -73,7 +73,7 @@ UNREAD = (
 )
 # what a source holds: a motion, masks, a video file, or pictures of a film
 Medium = Literal["motion", "masks", "video", "pictures"]
-# the same after `_place`: files are listed, and names of motions are known
+# where a source is, by `_place`: images are listed, and other names are not opened
 Place = Motion | str | Path | Images | NDArray[Any]
 
 

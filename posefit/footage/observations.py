@@ -88,15 +88,17 @@ class Observations(Sequence[Observation]):
 
     def silhouettes(self, k: int) -> list[Silhouette]:
         """Return the silhouettes of frame k, one per view. The latest are cached."""
-        kept = self._decoded.pop(k, None)
-        if kept is None:
-            kept = [self._silhouette(view, k) for view in self.views]
-        self._decoded[k] = kept
+        silhouettes = self._decoded.pop(k, None)
+        if silhouettes is None:
+            silhouettes = [self._silhouette(view, k) for view in self.views]
+        # at the end, because the first ones are forgotten first
+        self._decoded[k] = silhouettes
         while len(self._decoded) > self._most:
             self._decoded.popitem(last=False)
-        return kept
+        return silhouettes
 
     def _silhouette(self, view: View, k: int) -> Silhouette:
+        """Return a view's silhouette of frame k; one of several may be unknown."""
         if len(self.views) > 1 and not view.usable[k]:
             unknown = np.zeros(view.size[::-1], dtype=bool)
             return Silhouette.of(unknown, unknown)
@@ -106,7 +108,7 @@ class Observations(Sequence[Observation]):
 class _Silhouettes(Sequence[Silhouette]):
     """The silhouettes of one frame, decoded on first use.
 
-    To ask whether a frame is usable decodes nothing.
+    Asking whether a frame is usable decodes nothing.
     """
 
     def __init__(self, observations: Observations, k: int) -> None:

@@ -226,7 +226,7 @@ class People:
         return present
 
     def _end_lost(self, frame: int) -> None:
-        """Expect people no longer who were not seen for `MAX_GAP_SECONDS`."""
+        """Stop expecting people who are hidden for more than `MAX_GAP_SECONDS`."""
         active = list[Tracklet]()
         for tracklet in self.active:
             if frame - max(tracklet.detections) <= MAX_GAP_SECONDS * self._fps:
@@ -270,7 +270,7 @@ class People:
             if any(part.confirmed(least) for part in person):
                 confirmed.append(person)
         if not confirmed:
-            # nobody is sure to be a person: all that there is counts as one
+            # all of them may be noise, so they count as one person
             return [[part for person in persons for part in person]] if persons else []
         return sorted(confirmed, key=_score, reverse=True)
 

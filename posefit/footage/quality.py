@@ -152,8 +152,8 @@ class FrameQuality:
     def _is_ghost(self, image: Image, mask: Mask) -> bool:
         """Return whether a mask's outline is an edge in the background only.
 
-        Such a mask shows the place that a person has left who was learned into the
-        background.
+        Such a mask shows an empty place: the background was learned while the person
+        stood there.
         """
         if self._edges is None or not mask.any():
             return False
@@ -290,9 +290,9 @@ def verdict(
 
 
 def at_edge(cut: int, count: int) -> str:
-    """Return what is wrong with a film whose border cuts the person.
+    """Return the message that a film's border cuts the person in `cut` frames.
 
-    It does in `cut` of `count` frames.
+    `count` frames were looked at.
     """
     return (
         "expected a person who is whole in the picture, got one at its edge in "

@@ -64,7 +64,7 @@ class Scanner:
         self.segmenter = PersonSegmenter(video, how)
 
     def again(self) -> "Scanner":
-        """Return another pass through the same frames, with a segmenter that is new."""
+        """Return another pass through the same frames, with a new segmenter."""
         return Scanner(self.video, self.how, (self.start, self.stop))
 
     def scan(

@@ -107,18 +107,18 @@ def straightening(
 
     """
     notes = list[str]()
-    lens = Calibration.of(known, "") if isinstance(known, Camera) else known
+    calibration = Calibration.of(known, "") if isinstance(known, Camera) else known
+    lens = calibration
     if isinstance(known, Camera) and (known.width, known.height) == size:
         camera = known
     else:
-        stated = lens.size
-        lens = fitting(lens, filmed or size, scaled=filmed is None)
+        lens = fitting(calibration, filmed or size, scaled=filmed is None)
         # the world of a `Camera` is upright already
         if world is None or isinstance(known, Camera):
             world = np.eye(3)
         camera = lens.in_metres(metres).camera(size, world)
-        if stated not in (None, filmed or size):
-            notes.append(_resized(known, filmed or size))
+        if calibration.size not in (None, filmed or size):
+            notes.append(_resized(calibration, filmed or size))
     square = camera.squared()
     if square is not camera:
         ratio = camera.focal[0] / camera.focal[1]
@@ -131,9 +131,8 @@ def straightening(
     return square, Straightening(square, lens, lens.maps(size, square)), notes
 
 
-def _resized(known: Camera | Calibration, size: tuple[int, int]) -> str:
+def _resized(calibration: Calibration, size: tuple[int, int]) -> str:
     """Return the sentence about pictures that differ in size from their calibration."""
-    calibration = Calibration.of(known, "") if isinstance(known, Camera) else known
     width, height = calibration.size or size
     came = f"{size[0]}x{size[1]}"
     change = f"is scaled to {came}"

@@ -8,7 +8,7 @@ from posefit.footage.kinds import Medium
 from posefit.footage.options import SourceOptions
 from posefit.reading import quoted
 
-# the same, as messages call it
+# the kinds of sources, as messages call them
 _MEDIA: dict[Medium, str] = {
     "motion": "a motion",
     "masks": "masks",
