@@ -91,15 +91,8 @@ def track(
     chosen = TrackOptions(**options)
     scene = source if isinstance(source, Scene) else None
     resolved = _resolved(source)
-    changed = []
-    for each in fields(SourceOptions):
-        if getattr(chosen, each.name) != each.default:
-            changed.append(each.name)
-    if scene is not None and changed:
-        raise InputError(
-            "options of the source must be left out for a scene, "
-            f"got {', '.join(changed)}"
-        )
+    if scene is not None:
+        _check_no_source_options(chosen)
     check_used(resolved.medium, chosen)
     known = resolved.medium == "motion"
     _check_for_kind(chosen, known, [*resolved.named, *chosen.train])
@@ -119,25 +112,17 @@ def track(
         recorder = OutputFolder(out, force, resume, identity, progress.log, kinds)
     with recorder:
         with progress.phase("masks"):
-            start = clocks()
-            scene = scene or scene_of(resolved, chosen, progress)
-            # a known motion is rendered during tracking, not read here
-            if scene.truth is None:
-                seconds, cpu_seconds = (clocks() - start).tolist()
-                scene = replace(scene, reading_seconds=(seconds, cpu_seconds))
-                trim_memory()
+            scene = scene or _read_scene(resolved, chosen, progress)
         recorder.begin(scene)
         training = training_motions(clips, scene.fps)
         track = track_scene(
             scene, training, chosen, recorder=recorder, progress=progress
         )
-        # Python's numbers, even if NumPy's were given
-        view_degrees = list(chosen.view_degrees) or None  # type: ignore[arg-type]
         setup = replace(
             track.setup,
             source=list(resolved.names),
             frames_chosen=list(chosen.frames),
-            view_degrees=view_degrees,
+            view_degrees=list(chosen.degrees) or None,
         )
         track = replace(track, setup=setup)
         with progress.phase("write"):
@@ -174,6 +159,31 @@ def fit(
         frame = first_of(_resolved(source))
     frame = whole("frame", frame, 0)
     return track(source, frames=(frame, frame + 1), **options).frame(0)
+
+
+def _check_no_source_options(options: TrackOptions) -> None:
+    """Raise InputError if options of a source were given, for a scene."""
+    changed = []
+    for option in fields(SourceOptions):
+        if getattr(options, option.name) != option.default:
+            changed.append(option.name)
+    if changed:
+        raise InputError(
+            "options of the source must be left out for a scene, "
+            f"got {', '.join(changed)}"
+        )
+
+
+def _read_scene(source: Resolved, options: TrackOptions, progress: Progress) -> Scene:
+    """Return the scene of a source, for footage with the time that reading took."""
+    start = clocks()
+    scene = scene_of(source, options, progress)
+    # a known motion is rendered during tracking, not read here
+    if scene.truth is not None:
+        return scene
+    seconds, cpu_seconds = (clocks() - start).tolist()
+    trim_memory()
+    return replace(scene, reading_seconds=(seconds, cpu_seconds))
 
 
 def _check_names(function: str, options: Iterable[str], known: Sequence[str]) -> None:

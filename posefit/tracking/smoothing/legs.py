@@ -1,7 +1,7 @@
 """Which leg is the left one, over a whole film by one camera.
 
-Seen from the side, two legs that pass each other look like two legs that meet and go
-back, and a track may take one for the other. But if legs go back, or are exchanged in
+From the side, two legs that pass each other look like two legs that meet and go back,
+and a track may confuse the two. But if legs go back, or are exchanged in
 the middle of a stride, the body leaves the masks once its motion is smooth. So trials
 exchange the legs from each doubtful frame on. The costs of these trials, and of each
 stretch between them as it is and exchanged, give the cheapest sequence of exchanges.
@@ -81,13 +81,13 @@ def with_cheapest_legs(
     changed = np.zeros(len(tracked), dtype=bool)
     for _ in range(ROUNDS):
         exchanged = legs_exchanged(smoothed, tracked, usable, beta, threads, borders)
-        pairs = zip(tracked, exchanged, strict=True)
-        frames = [
-            _exchanged(smoothed.scene, frame) if other else frame
-            for frame, other in pairs
-        ]
         if not exchanged.any():
             break
+        frames = list[Frame]()
+        for frame, is_exchanged in zip(tracked, exchanged, strict=True):
+            if is_exchanged:
+                frame = _exchanged(smoothed.scene, frame)
+            frames.append(frame)
         again = smooth(scene, frames, shape, beta, borders)
         if mean_cost(again.frames, usable) >= mean_cost(smoothed.frames, usable):
             break
@@ -121,8 +121,9 @@ def legs_exchanged(
     scene = smoothed.scene
     borders = borders or Borders(scene.observations)
     costs = np.array([frame.cost for frame in smoothed.frames]) * usable
-    pairs = [frames, [_exchanged(scene, frame) for frame in frames]]
-    here, there = (scene.motion(each) for each in pairs)
+    # by whether legs are exchanged, 0 or 1
+    tracks = [frames, [_exchanged(scene, frame) for frame in frames]]
+    here, there = (scene.motion(track) for track in tracks)
     edges = doubtful(here, there, costs, usable)
     odds = _odds(scene, here)
     reach = max(round(TRIAL_SECONDS * scene.fps), 2)
@@ -138,33 +139,51 @@ def legs_exchanged(
     added = costs_there - costs_here
     exchanged = np.zeros(len(frames), dtype=np.int64)
     switches = []
-    side = 0  # whether legs are exchanged from the latest edge on
-    before = 0
+    latest = 0  # whether legs are exchanged from the latest edge on
     # in the order of time, because two edges near each other may be one exchange
     for edge in edges:
-        exchanged[before:edge] = side
-        before = edge
         rows = range(max(edge - reach, 0), min(edge + reach, len(frames)))
-        shown = [scene.observations[k] for k in rows]
-        window = replace(scene, observations=shown, count=len(shown))
-        earlier = exchanged[rows.start : edge].tolist()
+        observations = [scene.observations[k] for k in rows]
+        window = replace(scene, observations=observations, count=len(observations))
         trials = []
-        for later in (side, 1 - side):
-            which = [*earlier, *[later] * (rows.stop - edge)]
-            trial = [pairs[w][k] for w, k in zip(which, rows, strict=True)]
+        for later in (latest, 1 - latest):
+            exchanged[edge:] = later
+            trial = [tracks[exchanged[k]][k] for k in rows]
             trials.append(window.motion(trial))
         same, other = _smoothed_costs(
             window, trials, beta, borders.starting_at(rows.start), threads=threads
         )
+        # what the change from the edge on costs beyond the frames' own costs
         later_cost = added[edge : rows.stop].sum()
-        switch = other.sum() - same.sum() - (-later_cost if side else later_cost)
+        if latest:
+            later_cost = -later_cost
+        switch = other.sum() - same.sum() - later_cost
         switches.append(abs(switch))
         if switch < 0.0:
-            side = 1 - side
-    exchanged[before:] = side
+            latest = 1 - latest
+        exchanged[edge:] = latest
+    return _cheapest_exchanges(exchanged, edges, switches, added + odds)
+
+
+def _cheapest_exchanges(
+    exchanged: NDArray[np.int64],
+    edges: Sequence[int],
+    switches: Sequence[float],
+    added: Array,
+) -> NDArray[np.bool_]:
+    """Return in which frames (T,) legs are exchanged in the cheapest sequence.
+
+    Args:
+        exchanged: (T,) whether legs are exchanged, by the trials at each edge alone.
+        edges: The frames from which legs may be exchanged.
+        switches: The cost of deciding otherwise at each edge.
+        added: (T,) what an exchange adds to the costs of frames.
+
+    """
     starts = [0, *edges]
-    stops = [*edges, len(frames)]
-    stretches = np.add.reduceat(np.where(exchanged, -1.0, 1.0) * (added + odds), starts)
+    stops = [*edges, len(exchanged)]
+    # each stretch between edges stays as the trials have it, or is the other way round
+    stretches = np.add.reduceat(np.where(exchanged, -1.0, 1.0) * added, starts)
     steps = np.reshape(switches, (-1, 1, 1)) * (1.0 - np.eye(2))
     both_costs = np.column_stack([np.zeros(len(starts)), stretches])
     others = cheapest_sequence(both_costs, steps)

@@ -87,16 +87,16 @@ def drawn(
     costs = list[Array]()
     for start in range(0, len(rows), DRAWN_FRAMES):
         part = rows[start : start + DRAWN_FRAMES]
-        seen = ObservedFrames.of(scene.observations[k] for k in part.tolist())
+        observed = ObservedFrames.of(scene.observations[k] for k in part.tolist())
         areas.append(
-            seen.areas_of(
+            observed.areas_of(
                 scene.body,
                 scene.cameras,
                 motion.poses[part],
                 motion.translations[part],
             )
         )
-        costs.append(seen.costs(areas[-1][:, None], beta)[0])
+        costs.append(observed.costs(areas[-1][:, None], beta)[0])
     return np.concatenate(areas, axis=1), np.concatenate(costs)
 
 
