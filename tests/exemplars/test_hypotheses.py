@@ -226,9 +226,12 @@ def test_beside_an_earlier_track_clips_count_half_as_much_against_two_views(
     )
 
     def apart(observation: Observation) -> float:
-        totals = follower._joined(
-            FrameCosts(walk.task, observation, alone), hypotheses, None, 1.0
-        )[0].paths.totals
+        frame_costs = FrameCosts(walk.task, observation, alone)
+        costs, _ = follower._costs.of_poses(
+            frame_costs, hypotheses.poses, hypotheses.places, 1.0
+        )
+        states, _ = follower._joined(frame_costs, hypotheses, costs, None)
+        totals = states.paths.totals
         return float(totals[1] - totals[0])
 
     off = follower._exemplars.nearest(poses, 1)[1][:, 0] / 0.05**2
