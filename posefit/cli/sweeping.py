@@ -55,11 +55,12 @@ def sweep(
     from posefit.sweep import preview as previewing
     from posefit.sweep.engine import Limits
     from posefit.sweep.plan import Plan
+    from posefit.sweep.shard import file_of
 
     seconds = places.pop("cell_seconds")
     gigabytes = places.pop("cell_gigabytes")
     limits = Limits(seconds, gigabytes)
-    start = command.engine(limits, **places)
+    start = command.engine_starter(limits, **places)
     if dry_run:
         # a plugin may print, too
         with results_alone() if as_json else nullcontext():
@@ -72,7 +73,7 @@ def sweep(
     with results_alone() if as_json else nullcontext():
         how = {"retry_quarantined": retry_quarantined, "quiet": quiet}
         # before the plan is read, which may take seconds
-        command.file_of(shard)
+        file_of(shard)
         cells = Plan.read(plan)
         tell = (lambda _: None) if quiet else say
         # the engine starts before the folder is made: if it fails, there is no folder

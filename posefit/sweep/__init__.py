@@ -14,6 +14,8 @@ when they are read.
 | looking for | file |
 |---|---|
 | the cells of a plan, and their checks | plan.py, cell.py, check.py |
+| installed versions, compared with those of a cell | versions.py |
+| parts of a plan, for several machines | shard.py |
 | the steps of `posefit sweep`, and its preview | command.py, preview.py |
 | the loop that runs cells and writes their outcomes | drive.py |
 | the processes that run cells | engine.py, pool.py, worker.py, serve.py, cluster.py |

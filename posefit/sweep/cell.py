@@ -8,12 +8,13 @@ import json
 import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from posefit.errors import InputError
 from posefit.settings import settings_text
+from posefit.sweep.versions import other_version
 from posefit.version import posefit_build
 
 if TYPE_CHECKING:
@@ -174,12 +175,7 @@ class TrackCell(Cell):
         from posefit.tracking.options import TrackOptions
         from posefit.tracking.pipeline import track_scene
 
-        for path, digest in self.files.items():
-            if (present := digest_of(path)) != digest:
-                raise InputError(
-                    f"{path} must be the file that was planned, "
-                    f"{digest[:8]}, got {present[:8]}"
-                )
+        self._check_files()
         scene = cell_scene(self)
         clips = training_clips(self.train, followed=self.motion)
         training = training_motions(clips, scene.fps)
@@ -215,6 +211,16 @@ class TrackCell(Cell):
             ),
             "trace": anytime_trace(result.frames),
         }
+
+    def _check_files(self) -> None:
+        """Raise InputError if a motion file has changed since the cell was planned."""
+        for path, planned in self.files.items():
+            present = digest_of(path)
+            if present != planned:
+                raise InputError(
+                    f"{path} must be the file that was planned, "
+                    f"{planned[:8]}, got {present[:8]}"
+                )
 
 
 @dataclass(frozen=True)
@@ -329,49 +335,6 @@ def run_cell(cell: Cell) -> dict[str, Any]:
             "got some that are not"
         ) from None
     return row
-
-
-def foreign_plugins(version: str) -> str:
-    """Return the part of a cell's version that is about plugins from elsewhere."""
-    origins = installed()
-    return ", ".join(part for part in version.split(", ") if not origins.get(part))
-
-
-def other_version(origin: str) -> str | None:
-    """Return the installed version of a library if it differs from the planned one.
-
-    Args:
-        origin: The library's name and its planned version, one part of a cell's
-            version.
-
-    Returns:
-        The origin of the installed version, or None if it is the same or the library is
-        not installed.
-    """
-    name = origin.partition(" ")[0]
-    origins = installed()
-    if origin in origins:
-        return None
-    for other in origins:
-        if other.partition(" ")[0] == name:
-            return other
-    return None
-
-
-@lru_cache(maxsize=1)
-def installed() -> dict[str, bool]:
-    """Return the origins of posefit and all plugins, and whether each is posefit's own.
-
-    See `posefit.registry.Offer.origin`.
-    """
-    from posefit.hooks import PROJECT
-    from posefit.registry import registry
-
-    origins = {posefit_build(): True}
-    for named in registry().offers.values():
-        for offer in named.values():
-            origins[offer.origin] = offer.distribution == PROJECT
-    return origins
 
 
 def cell_scene(cell: TrackCell) -> "Scene":

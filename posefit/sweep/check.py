@@ -30,9 +30,9 @@ from posefit.sweep.cell import (
     SearchCell,
     TrackCell,
     digest_of,
-    installed,
     json_of,
 )
+from posefit.sweep.versions import installed
 from posefit.tracking.method import method_names, parsed_settings, places_of
 from posefit.tracking.options import TrackOptions
 from posefit.version import source_digest
@@ -66,7 +66,7 @@ def cell_of(spec: Mapping[str, Any]) -> TrackCell:
     values = _checked(spec, CHECKS, ("method", "motion"))
     texts = tuple(settings.settings_text(values.get("settings", {})))
     evaluations = values.get("evaluations", TrackCell.evaluations)
-    chosen, version = _of_method(values["method"], texts, evaluations)
+    chosen, version = _settings_and_version(values["method"], texts, evaluations)
     train = values.get("train") or _other_styles(values["motion"])
     if values["motion"] in train:
         raise InputError(
@@ -118,7 +118,7 @@ def search_of(spec: Mapping[str, Any]) -> SearchCell | None:
         *(values[name] for name in ("suite", "function", "instance", "dimension"))
     )
     evaluations = values.pop("budget") * dimension
-    version = _of_search(
+    version = _search_version(
         values["method"], json_of(values.get("settings", {})), evaluations
     )
     return SearchCell(**{**values, "evaluations": evaluations, "version": version})
@@ -128,17 +128,30 @@ def search_method(entry: Mapping[str, Any]) -> dict[str, Any]:
     """Return an entry of a list of optimisers, with its settings checked.
 
     Settings may be written `NAME.SETTING`; in the result they are named `SETTING`.
+    Raises InputError if NAME is not the optimiser's, or a setting has two values.
     """
     method = _name("method", entry.get("method"))
-    entered = flattened("settings", entry.get("settings", {})).items()
-    chosen = {name.rpartition(".")[2]: value for name, value in entered}
+    optimiser = method.partition(":")[0]
+    chosen: dict[str, Any] = {}
+    for name, value in flattened("settings", entry.get("settings", {})).items():
+        owner, _, setting = name.rpartition(".")
+        if owner not in ("", optimiser):
+            raise InputError(
+                f"settings of {method} must be named {optimiser}.SETTING, "
+                f"got {quoted(name)}"
+            )
+        if setting in chosen:
+            raise InputError(
+                f"settings must hold {optimiser}.{setting} once, got it twice"
+            )
+        chosen[setting] = value
     return {
         **entry,
         "settings": settings.check(method, registry().optimiser(method), chosen),
     }
 
 
-def forget() -> None:
+def clear_caches() -> None:
     """Clear the caches of methods and files that the cells of one plan share.
 
     Before the next plan a file may have changed, or a comparison may have registered
@@ -146,8 +159,8 @@ def forget() -> None:
     """
     for cached in (
         _offers,
-        _of_method,
-        _of_search,
+        _settings_and_version,
+        _search_version,
         _other_styles,
         _files,
         _length,
@@ -195,7 +208,7 @@ def _offers(method: str) -> tuple[Offer, ...]:
 
 
 @lru_cache(maxsize=1024)
-def _of_method(
+def _settings_and_version(
     method: str, texts: tuple[str, ...], evaluations: int
 ) -> tuple[dict[str, Any], str]:
     """Return a method's settings, sorted by name, with their types, and its version.
@@ -216,8 +229,8 @@ def _of_method(
 
 
 @lru_cache(maxsize=1024)
-def _of_search(method: str, chosen: str, evaluations: int) -> str:
-    """Return the version of an optimiser.
+def _search_version(method: str, chosen: str, evaluations: int) -> str:
+    """Return the version of an optimiser, after a check of its population.
 
     `chosen` is the JSON text of its settings. Raises InputError if one population with
     these settings takes more evaluations than there are.
@@ -227,12 +240,15 @@ def _of_search(method: str, chosen: str, evaluations: int) -> str:
     return version_of([offer.origin])
 
 
-def _check_population(offer: Offer, chosen: Mapping[str, Any], most: int) -> None:
-    size = settings.population(offer.factory, chosen, most)
-    if size > most:
+def _check_population(
+    offer: Offer, chosen: Mapping[str, Any], evaluations: int
+) -> None:
+    """Raise InputError if one population takes more evaluations than there are."""
+    size = settings.population(offer.factory, chosen, evaluations)
+    if size > evaluations:
         raise InputError(
             f"evaluations must hold one population of {size}, "
-            f"got {most} of {offer.name}"
+            f"got {evaluations} of {offer.name}"
         )
 
 
@@ -308,11 +324,14 @@ def _motion(field: str, value: Any) -> str:
 def _train(field: str, value: Any) -> tuple[str, ...]:
     if not isinstance(value, list | tuple):
         raise InputError(f"{field} must be a list of motions, got {quoted(value)}")
-    return tuple(_learned_from(field, source) for source in value)
+    return tuple(_training_source(field, source) for source in value)
 
 
-def _learned_from(field: str, value: Any) -> str:
-    """Return a source of training: a motion, people of the library, or a folder."""
+def _training_source(field: str, value: Any) -> str:
+    """Return a source of training motions: a file, a folder, or names.
+
+    The names are those of built-in motions, or of people of the library.
+    """
     if recorded.is_library(value):
         recorded.named(value)  # raises if a person is unknown
         return str(value)

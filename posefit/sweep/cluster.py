@@ -20,11 +20,11 @@ from posefit.sweep.pool import Pool
 from posefit.version import posefit_build
 
 CONNECT_TIMEOUT_SECONDS = 30.0  # of waiting for a scheduler, and for its workers
-CLOSE_SECONDS = 5.0
+CLOSE_SECONDS = 5.0  # of waiting for a result that is ready, and for the end
 # An expression of a process's posefit build. It is a text, because a function of
 # posefit could not be sent to a process that lacks posefit.
 _BUILD = "__import__('posefit.version', fromlist=['version']).posefit_build()"
-_thread = threading.local()
+_thread = threading.local()  # the pool of each thread of a Dask worker
 
 
 class Cluster:
@@ -84,12 +84,14 @@ class Cluster:
         own fault. The scheduler needs posefit to read a job.
         """
         wanted = posefit_build()
-        for worker, found in self._client.run(eval, _BUILD, on_error="return").items():
-            if found != wanted:
-                came = found
-                if not isinstance(found, str):
-                    came = f"none ({text_of(found)})"
-                raise InputError(f"the worker {worker} must have {wanted}, got {came}")
+        # a build, or the error of a process without posefit
+        builds = self._client.run(eval, _BUILD, on_error="return")
+        for worker, build in builds.items():
+            if build == wanted:
+                continue
+            if not isinstance(build, str):
+                build = f"none ({text_of(build)})"
+            raise InputError(f"the worker {worker} must have {wanted}, got {build}")
         try:
             self._client.run_on_scheduler(eval, _BUILD)
         except ImportError as error:
@@ -108,9 +110,7 @@ class Cluster:
             return max(1, 2 * int(sum(self._client.nthreads().values())))
         # raised by a client whose scheduler went away
         except (OSError, TimeoutError, ValueError, AttributeError):
-            raise InputError(
-                f"scheduler {self._address} must stay connected, got a lost connection"
-            ) from None
+            raise self._lost_connection() from None
 
     def submit(self, job: Any, tenant: str = "") -> None:
         """Send a job; Dask chooses the worker."""
@@ -123,9 +123,7 @@ class Cluster:
     def wait(self, seconds: float) -> list[Outcome]:
         """Return the outcomes of the jobs that ended."""
         if self._client.status != "running":
-            raise InputError(
-                f"scheduler {self._address} must stay connected, got a lost connection"
-            )
+            raise self._lost_connection()
         if self._running:
             with (
                 suppress(TimeoutError, self._distributed.CancelledError),
@@ -137,7 +135,7 @@ class Cluster:
         done = [future for future in self._running if future.done()]
         if not done:
             return []
-        # side by side, because the way to a worker and back takes time
+        # in parallel, because fetching a result from a worker takes time
         with ThreadPoolExecutor(len(done)) as threads:
             return list(threads.map(self._outcome, done))
 
@@ -147,6 +145,11 @@ class Cluster:
             future.cancel()
         if self._client is not None:
             self._client.close(timeout=CLOSE_SECONDS)
+
+    def _lost_connection(self) -> InputError:
+        return InputError(
+            f"scheduler {self._address} must stay connected, got a lost connection"
+        )
 
     def _outcome(self, future: Any) -> Outcome:
         job = self._running.pop(future)

@@ -1,9 +1,8 @@
 """The steps of the command `posefit sweep`."""
 
 import os
-import re
 import shlex
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from contextlib import closing
 from pathlib import Path
 
@@ -11,16 +10,13 @@ from posefit.errors import InputError
 from posefit.progress import bars_shown
 from posefit.reading import counted, cut
 from posefit.silhouette.sharing import cores
-from posefit.sweep.cell import Cell, other_version, run_cell
+from posefit.sweep.cell import Cell, run_cell
 from posefit.sweep.drive import Tally, drive
 from posefit.sweep.engine import Engine, Limits
-from posefit.sweep.ledger import Ledger
-from posefit.sweep.plan import MAX_CELLS
 from posefit.sweep.pool import Pool
-from posefit.sweep.schema import FILE
+from posefit.sweep.shard import cells_of, done_in, ledgers_of
+from posefit.sweep.versions import other_version
 from posefit.sweep.writer import Writer
-
-SHARDS = "ledger-*-of-*.sqlite"  # matches the names that `file_of` returns
 
 
 def swept(
@@ -62,10 +58,8 @@ def swept(
     with closing(engine), Writer(file) as ledger:
         for version, count in ledger.versions().items():
             if any(map(other_version, version.split(", "))):
-                say(
-                    f"{counted(count, 'row')} in {out} are of another version, "
-                    f"{cut(version)}, and do not count here"
-                )
+                rows = counted(count, "row")
+                say(f"{out}: {rows} of another version, {cut(version)}, not counted")
         ledger.plan(cells_of(plan, shard), done_in(others))
         if retry_quarantined:
             count = ledger.release_quarantined()
@@ -73,13 +67,17 @@ def swept(
             say(f"{count} {cells} out of quarantine, to be tried again")
         counts = ledger.counts()
         total = counts.total()
-        finished = counts["done"] + counts["quarantined"]
-        if finished:
-            say(f"{finished} of {total} cells are done already")
+        if counts["done"]:
+            say(f"{counts['done']} of {total} cells are done already")
+        if counts["quarantined"]:
+            say(
+                f"{counted(counts['quarantined'], 'cell')} in quarantine: "
+                "--retry-quarantined tries again"
+            )
         hidden = quiet or not bars_shown()
         with tqdm(
             total=total,
-            initial=finished,
+            initial=counts["done"] + counts["quarantined"],
             unit="cell",
             dynamic_ncols=True,
             disable=hidden,
@@ -101,52 +99,7 @@ def swept(
             return drive(ledger, engine, say_beside_bar, watch)
 
 
-def file_of(shard: str | None) -> str:
-    """Return the name of a ledger's file: of a shard I/N, or of all cells for None.
-
-    Raises InputError if the shard is not I/N.
-    """
-    if shard is None:
-        return FILE
-    match = re.fullmatch(r"([0-9]{1,7})/([0-9]{1,7})", shard)
-    if not match or not 1 <= int(match[1]) <= int(match[2]) <= MAX_CELLS:
-        raise InputError(f"--shard must be I/N such as 2/8, got {cut(shard)}")
-    return f"ledger-{int(match[1])}-of-{int(match[2])}.sqlite"
-
-
-def cells_of(plan: Iterable[Cell], shard: str | None) -> Iterator[Cell]:
-    """Return the cells of a plan, or of one shard I/N.
-
-    A cell's key alone decides its shard. So it does not move to another shard when the
-    plan grows.
-    """
-    if shard is None:
-        return iter(plan)
-    number, count = map(int, shard.split("/"))
-    return (cell for cell in plan if int(cell.key, 16) % count == number - 1)
-
-
-def ledgers_of(out: str | Path, shard: str | None) -> list[Path]:
-    """Return the ledgers whose finished cells a run does not repeat, its own first.
-
-    The others are those of shards, for a run without shards.
-    """
-    ledgers = [Path(out) / file_of(shard)]
-    if shard is None:
-        ledgers += sorted(Path(out).glob(SHARDS))
-    return ledgers
-
-
-def done_in(ledgers: Iterable[Path]) -> set[str]:
-    """Return the keys of the cells that are done in ledgers, as far as these exist."""
-    files = [file for file in ledgers if file.exists() and file.stat().st_size]
-    if not files:
-        return set()
-    with Ledger(*files) as ledger:
-        return ledger.done()
-
-
-def engine(
+def engine_starter(
     limits: Limits,
     *,
     workers: int | None = None,

@@ -17,8 +17,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 from posefit.errors import InputError
-from posefit.sweep.cell import foreign_plugins
 from posefit.sweep.engine import POLL_SECONDS, Engine, Outcome
+from posefit.sweep.versions import foreign_plugins
 from posefit.sweep.writer import Writer
 
 WRITE_SECONDS = 0.2  # the least time between two writes while cells run

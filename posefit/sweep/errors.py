@@ -1,5 +1,6 @@
 """What the errors of SQLite mean for the user of a ledger."""
 
+import shlex
 import sqlite3
 from pathlib import Path
 
@@ -16,7 +17,7 @@ def unusable(file: Path, error: Exception, *, writes: bool = False) -> InputErro
         return InputError(
             f"{file}: expected an intact SQLite file, got {cut(str(error))}: use a "
             "backup, or recover the readable part with "
-            f"sqlite3 {file.name} .recover"
+            f"sqlite3 {shlex.quote(file.name)} .recover"
         )
     found = cut(str(getattr(error, "strerror", None) or error))
     if "locked" in found:

@@ -20,6 +20,7 @@ The view `runs` has columns for the values that queries use most (schema.py).
 
 import json
 import os
+import re
 import shlex
 import sqlite3
 from array import array
@@ -42,8 +43,10 @@ if TYPE_CHECKING:
 
 OPEN_SECONDS = 5.0  # the longest wait for a program that locks a file
 MAX_VALUE_BYTES = 200_000_000  # of one value that is read
-STATUSES = ("done", "quarantined")  # of rows
-OF = "FROM cells WHERE status = ? ORDER BY rowid"  # the end of most queries
+KEY = re.compile("[0-9a-f]{64}")  # of a cell
+# of rows. The order decides which of several rows of a cell counts: a finished one.
+STATUSES = ("done", "quarantined")
+WITH_STATUS = "FROM cells WHERE status = ? ORDER BY rowid"  # the end of most queries
 
 
 class Ledger:
@@ -81,21 +84,22 @@ class Ledger:
             opened.callback(self.close)
             for name in names:
                 self._files.append(_File(name))
-            self._count()
+            self._choose_cells()
             opened.pop_all()
 
-    def _count(self) -> None:
-        """Note the cells that count."""
+    def _choose_cells(self) -> None:
+        """Fill `counted` of each file with the cells that count."""
         # the keys of one file differ, so it needs no set of perhaps a million
         several = len(self._files) > 1
-        seen = set[str]()
+        earlier = set[str]()
+        query = f"SELECT rowid, key {WITH_STATUS}"
         for status in STATUSES:
             for file in self._files:
-                for rowid, key in file.query(f"SELECT rowid, key {OF}", status):
-                    if several and key in seen:
+                for rowid, key in file.query(query, status):
+                    if several and key in earlier:
                         continue
                     if several:
-                        seen.add(key)
+                        earlier.add(key)
                     file.counted[status].append(rowid)
 
     def __enter__(self) -> Self:
@@ -169,15 +173,21 @@ class Ledger:
     def damaged_row(self, key: str, error: Exception) -> InputError:
         """Return the error of a row that was changed since posefit wrote it.
 
-        Its message has a command that plans the cell again.
+        Its message has a command that plans the cell again, if the key is posefit's.
         """
         name = quoted(key[:8])[1:-1]
         having = [file.path for file in self._files if file.counts(key)]
         path, *_ = having or [self._files[0].path]
+        problem = (
+            f"{path}: the row of cell {name} must be written by posefit: "
+            f"{cut(text_of(error))}"
+        )
+        # a key of somebody else's ledger could hold a command of the shell
+        if not KEY.fullmatch(key):
+            return InputError(f"{problem}; its key is not one of posefit's either")
         statement = f"UPDATE cells SET status = 'planned' WHERE key LIKE '{name}%'"
         return InputError(
-            f"{path}: the row of cell {name} must be written by posefit: "
-            f"{cut(text_of(error))}; "
+            f"{problem}; "
             f'to run it again: sqlite3 {shlex.quote(str(path))} "{statement}"'
         )
 
@@ -216,7 +226,8 @@ class _File:
 
     def cells(self, columns: str, status: str) -> Iterator[Any]:
         """Yield columns of the cells that count."""
-        for rowid, *values in self.query(f"SELECT rowid, {columns} {OF}", status):
+        query = f"SELECT rowid, {columns} {WITH_STATUS}"
+        for rowid, *values in self.query(query, status):
             # a driver may have finished others since the ledger was opened
             if _is_in(rowid, self.counted[status]):
                 yield values

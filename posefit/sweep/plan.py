@@ -25,13 +25,14 @@ from posefit.sweep.cell import Cell
 from posefit.sweep.check import (
     FIELDS,
     cell_of,
+    clear_caches,
     families,
     flattened,
-    forget,
     search_method,
     search_of,
 )
 
+# the lists of a product of tracks, with the field that each sets
 LISTS = {
     "methods": "method",
     "motions": "motion",
@@ -40,7 +41,8 @@ LISTS = {
     "instances": "instance",
     "seeds": "seed",
 }
-SEARCH_LISTS = {  # with the field of each list, and its default
+# the lists of a plan of searches, with the field of each and its default
+SEARCH_LISTS = {
     "dimensions": ("dimension", [9]),
     "functions": ("function", [function.number for function in FUNCTIONS]),
     "instances": ("instance", 15),
@@ -52,8 +54,9 @@ PARTS = {"optimisers": "optimiser", "priors": "prior"}  # the parts of a method
 TABLES = ("defaults", "product", "grid", "cells")
 DEFAULT = "default"  # the name of the plan that comes with posefit
 INPUT = "-"  # the name of a plan that is read from standard input
-MAX_CELLS = 1_000_000  # cells
-MAX_BYTES = 1_000_000  # bytes
+MAX_CELLS = 1_000_000  # of a product
+MAX_BYTES = 1_000_000  # of a plan's text
+# what a grid holds, for messages
 GRID = 'settings and their values such as "sapso.inertia" = [0.7, 0.9]'
 
 Entry = Mapping[str, Any]
@@ -71,7 +74,7 @@ class Plan:
 
     def __init__(self, cells: Callable[[], Iterator[Cell]]) -> None:
         self._cells = cells
-        forget()
+        clear_caches()
         keys: set[bytes] = set()
         for cell in cells():
             if (key := bytes.fromhex(cell.key)) in keys:
@@ -282,15 +285,15 @@ def _searches(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
     _check_count(lists)
 
     def cells() -> Iterator[Cell]:
-        found = set()
+        searched = set()  # the functions that have cells
         for spec in _product(lists):
             cell = search_of({**shared, **spec})
             if cell is not None:
-                found.add(cell.function)
+                searched.add(cell.function)
                 yield cell
         for entry in tables.get("functions", ()):
             number = suite_function(_fields("function", entry)["function"]).number
-            if number not in found:
+            if number not in searched:
                 raise InputError(
                     "functions must exist in one of the plan's dimensions, "
                     f"got {number}, which exists in none of them"
@@ -414,14 +417,14 @@ def _check_names(
 
 def _check_fields(lists: Mapping[str, Sequence[Any]]) -> None:
     """Raise InputError if two lists set the same field."""
-    said: set[str] = set()
+    earlier = set[str]()  # the fields that the lists before this one set
     for field, entries in lists.items():
         names = set[str]().union(*(_fields(field, entry) for entry in entries))
-        if names & said:
+        if names & earlier:
             raise InputError(
-                f"a product must set {min(names & said)} in one list, got it in two"
+                f"a product must set {min(names & earlier)} in one list, got it in two"
             )
-        said |= names
+        earlier |= names
 
 
 def _check_count(lists: Mapping[str, Sequence[Any]]) -> None:

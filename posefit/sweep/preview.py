@@ -14,11 +14,12 @@ from typing import Any, NamedTuple
 from posefit.errors import InputError
 from posefit.reading import cut
 from posefit.settings import settings_text
-from posefit.sweep.cell import Cell, TrackCell, foreign_plugins, json_of, run_cell
-from posefit.sweep.command import cells_of, done_in, file_of, ledgers_of
+from posefit.sweep.cell import Cell, TrackCell, json_of, run_cell
 from posefit.sweep.engine import POLL_SECONDS, Limits, Outcome
 from posefit.sweep.plan import Plan
 from posefit.sweep.pool import Pool
+from posefit.sweep.shard import cells_of, done_in, file_of, ledgers_of
+from posefit.sweep.versions import foreign_plugins
 
 VALUES = 12  # the most values of a field that a preview lists
 FRAMES = 4  # of the short run of a method
@@ -60,11 +61,11 @@ def preview(plan: str, out: str | None, shard: str | None, limits: Limits) -> Pr
             to_run.setdefault(method, []).append(cell)
     cells = [cell for group in to_run.values() for cell in group]
     evaluations = sum(cell.total_evaluations for cell in cells)
-    last = (
+    totals = (
         f"{len(listed):,} cells, {len(cells):,} of them to run, "
         f"{evaluations:,} evaluations"
     )
-    lines = [*_value_lines(counts), last]
+    lines = [*_value_lines(counts), totals]
     with closing(Pool(1, limits, run_cell)) as pool:
         seconds = sum(_seconds_of(group, pool) for group in to_run.values())
     return Preview(lines, listed, seconds)

@@ -62,7 +62,7 @@ def rerun(ledger: str | Path, key: str, out: str | Path | None = None) -> list[s
             )
         (cell,) = plan
         now = _row_of(folder, cell.key)
-    return _differences(earlier, now)
+    return differences(earlier, now)
 
 
 def _row_of(ledger: str | Path, key: str) -> dict[str, Any]:
@@ -84,7 +84,7 @@ def _row_of(ledger: str | Path, key: str) -> dict[str, Any]:
     return rows[0]
 
 
-def _differences(earlier: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
+def differences(earlier: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
     """Return lines about the differences between two rows of a cell."""
     before = flat(earlier)
     after = flat(now)
@@ -99,13 +99,14 @@ def _differences(earlier: Mapping[str, Any], now: Mapping[str, Any]) -> list[str
     if earlier["status"] != "done":
         return [*lines, "it had failed, and is done now"]
     differing = []
-    for name, value in after.items():
+    # a figure that is unknown in one of them has other columns there
+    for name in {**after, **before}:
         if name in (*TIMES, "key", "version"):
             continue
-        if before.get(name) != value:
+        if before.get(name) != after.get(name):
             differing.append(name)
     for name in differing[:MAX_SHOWN]:
-        lines.append(f"{name}: {before.get(name)} before, {after[name]} now")
+        lines.append(f"{name}: {before.get(name)} before, {after.get(name)} now")
     if len(differing) > MAX_SHOWN:
         more = counted(len(differing) - MAX_SHOWN, "other figure")
         lines.append(f"{more} differ, too")

@@ -194,12 +194,13 @@ class Writer:
         return quarantined
 
     def release_quarantined(self) -> int:
-        """Let the plan's cells out of quarantine, and return how many."""
+        """Plan the plan's quarantined cells again, and return how many."""
         query = (
             "UPDATE cells SET status = 'planned', faults = '[]', losses = 0 "
             "WHERE status = 'quarantined' AND key IN (SELECT key FROM planned)"
         )
-        return self._db.execute(query).rowcount
+        with self.transaction():
+            return self._db.execute(query).rowcount
 
     def versions(self) -> dict[str, int]:
         """Return the number of finished cells by their version."""

@@ -113,6 +113,9 @@ def test_quarantined_cells_are_run_again_on_request(plan: Path, tmp_path: Path) 
         f"written to {out}; 1 quarantined: posefit report names the reasons"
         in lost.stdout
     )
+    still = run(*words)
+    assert "1 cell in quarantine: --retry-quarantined tries again" in still.stderr
+    assert "done already" not in still.stderr
     again = run(*words, "--retry-quarantined")
     assert again.exit_code == 0, again.stderr
     assert "1 of 1 cells done, 1 of them now" in again.stdout

@@ -21,12 +21,13 @@ import pytest
 
 from posefit.errors import InputError
 from posefit.registry import registry
-from posefit.sweep.cell import other_version
-from posefit.sweep.command import cells_of, swept
+from posefit.sweep.command import swept
 from posefit.sweep.drive import drive
 from posefit.sweep.engine import Outcome
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.schema import FILE, FORMAT, MIGRATIONS
+from posefit.sweep.shard import cells_of
+from posefit.sweep.versions import other_version
 from posefit.sweep.writer import ATTEMPTS, LOSSES, Writer
 from posefit.version import posefit_build
 from tests.cases import each
@@ -134,6 +135,27 @@ def test_a_row_that_posefit_did_not_write_is_named_with_advice(
     changed(folder, "UPDATE cells SET spec = ? WHERE key = ?", json.dumps(SPEC), key)
     filled(folder, 2)
     assert len(rows_in(folder)) == 2
+
+
+def test_a_command_for_the_shell_holds_no_key_that_posefit_did_not_make(
+    tmp_path: Path,
+) -> None:
+    folder = filled(tmp_path / "results", 1)
+    changed(folder, "UPDATE cells SET key = '`reboot`', row = '2'")
+    with pytest.raises(ValueError, match="its key is not one of posefit's") as caught:
+        rows_in(folder)
+    assert "UPDATE" not in str(caught.value)
+
+
+def test_quarantined_cells_of_a_locked_ledger_are_reported_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = filled(tmp_path / "results", 1)
+    monkeypatch.setattr("posefit.sweep.writer.BUSY_SECONDS", 0.01)
+    with Writer(folder / FILE) as ledger, closing(CONNECT(folder / FILE)) as other:
+        other.execute("BEGIN IMMEDIATE")
+        with pytest.raises(ValueError, match="got one in use"):
+            ledger.release_quarantined()
 
 
 def test_a_damaged_file_is_reported_in_one_line_with_sqlites_own_reason_and_what_to_do(
@@ -565,7 +587,7 @@ def test_rows_of_another_version_are_read_and_counted_and_their_cells_run_again(
     messages: list[str] = []
     assert swept(cells(3), folder, Instant(), messages.append).ran == 3
     assert messages == [
-        f"2 rows in {folder} are of another version, posefit 0.0.9 a1, and do not count here"
+        f"{folder}: 2 rows of another version, posefit 0.0.9 a1, not counted"
     ]
     with Ledger(folder) as ledger:
         assert len(ledger) == 5

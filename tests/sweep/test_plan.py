@@ -194,6 +194,8 @@ def test_mistakes_are_named(tables: dict[str, Any], message: str) -> None:
         ({"functions": [1, 7], "dimensions": [9]}, "functions must exist in one of the plan's dimensions, got 7, which"),
         ({"functions": ["1"]}, "function must be a whole number of at least 1, got '1'"),
         ({"methods": [{"name": "a"}]}, "method must be a name, got None"),
+        ({"methods": [{"method": "pso", "settings": {"cma.population_size": 20}}]}, r"settings of pso must be named pso.SETTING, got 'cma.population_size'"),
+        ({"methods": [{"method": "pso", "settings": {"pso.population_size": 20, "population_size": 9}}]}, "settings must hold pso.population_size once, got it twice"),
     ],
 )  # fmt: skip
 def test_mistakes_in_plans_of_searches_are_named(

@@ -15,9 +15,10 @@ import pytest
 from posefit.sweep.cell import run_cell
 from posefit.sweep.check import cell_of, search_of
 from posefit.sweep.plan import Plan
-from posefit.sweep.repeat import repeat_command
+from posefit.sweep.repeat import differences, repeat_command
+from tests.cases import each
 from tests.commands import error_of, run
-from tests.report.browser import ledger
+from tests.report.browser import ledger, result
 from tests.sweep.fake import cells, rows_in
 
 SMALL: dict[str, Any] = {"frames": 2, "size": [80, 60], "evaluations": 80}
@@ -153,6 +154,19 @@ def test_differences_of_a_row_that_is_run_again_are_printed(tmp_path: Path) -> N
         "differences": [f"iou: 0.25 before, {iou} now"],
     }
     assert [entry.name for entry in tmp_path.iterdir()] == ["results"]
+
+
+@each(
+    ("earlier", "now", "line"),
+    [
+        ({"80": 0.9}, None, "coverage.80: 0.9 before, None now"),
+        (None, {"80": 0.9}, "coverage.80: None before, 0.9 now"),
+    ],
+)
+def test_a_figure_that_only_one_of_two_rows_has_differs(earlier, now, line) -> None:
+    row = result(cells(1)[0], 1.0)
+    rows = [{**row, "coverage": coverage} for coverage in (earlier, now)]
+    assert line in differences(*rows)
 
 
 def test_a_key_that_no_row_or_several_have_is_reported_in_one_line(
