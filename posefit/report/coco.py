@@ -16,8 +16,8 @@ from posefit.report.contest import Runs
 from posefit.suites.problem import TARGETS
 from posefit.suites.running import SuiteRun
 
-# Of a run COCO's logger writes the rows at which a target is reached, and those at
-# certain evaluations. Here both files have every improvement.
+# COCO's logger writes two files for each run: one of the rows at which a target is
+# reached, one of the rows at certain evaluations. Here both have every improvement.
 FILES = (".dat", ".tdat")
 FORMAT = "bbob-new2"  # the columns of `_rows`
 
@@ -84,7 +84,7 @@ def _index(name: str, file: str, group: Sequence[SuiteRun]) -> str:
 
 
 def _rows(run: SuiteRun) -> str:
-    """Return the rows of a run: evaluations, of constraints none, and best cost."""
+    """Return the rows of a run: function evaluations, 0 of constraints, best cost."""
     lines = ["% f evaluations | g evaluations | best cost above the true pose's\n"]
     for used, cost in zip(run.evaluations, run.costs, strict=True):
         lines.append(f"{int(used)} 0 {_above(run, cost):+.9e}\n")

@@ -122,7 +122,7 @@ class Score:
         return self.column.measure.digits
 
     @property
-    def down(self) -> bool:
+    def higher_is_better(self) -> bool:
         """Whether a higher value is better."""
         return self.column.higher_is_better
 
@@ -133,7 +133,7 @@ class Score:
             **texts,
             "name": self.name,
             "digits": self.digits,
-            "down": self.down,
+            "down": self.higher_is_better,
         }
 
     def text(self, value: float) -> str:

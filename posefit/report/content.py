@@ -39,21 +39,12 @@ def data_of(ledger: Ledger, runs: Runs, standings: Standings | None) -> dict[str
     contest = standings.contest if standings else None
     kind = runs.kind
     date = time.strftime("%d %B %Y", time.localtime(ledger.changed))
-    # each text once, as many runs have the same
-    warnings: list[str] = []
-    for texts in runs.warnings.values():
-        warnings += texts
-    warnings = list(dict.fromkeys(warnings))
-    # the texts of a row by their places in `warnings`
-    place_of = {text: k for k, text in enumerate(warnings)}
-    warned = {}
-    for row, texts in runs.warnings.items():
-        warned[row] = [place_of[text] for text in texts]
+    warnings, warned = _warnings(runs)
     methods = []
     for name, settings in zip(runs.methods, runs.settings, strict=True):
         methods.append({"name": name, "settings": settings})
     answer = "No run has an error: nothing can be compared."
-    if runs.failures:
+    if not len(runs):
         answer = "Every cell failed."
     data: dict[str, Any] = {
         "title": kind.title,
@@ -87,6 +78,18 @@ def data_of(ledger: Ledger, runs: Runs, standings: Standings | None) -> dict[str
     if runs.failures:
         data["sections"] = [*data["sections"], "failures"]
     return data
+
+
+def _warnings(runs: Runs) -> tuple[list[str], dict[int, list[int]]]:
+    """Return the texts of all warnings, and the texts of each row by their indices.
+
+    Each text is there once, because many runs have the same.
+    """
+    index_of: dict[str, int] = {}
+    warned = {}
+    for row, texts in runs.warnings.items():
+        warned[row] = [index_of.setdefault(text, len(index_of)) for text in texts]
+    return list(index_of), warned
 
 
 def _header(runs: Runs, contest: Contest | None) -> dict[str, Any]:

@@ -27,7 +27,7 @@ from posefit.statistics.pairing import Shared, most_shared
 # studies instead of 95 %.
 MIN_LOST = 3
 
-Place = Mapping[str, Any]  # the fields of a plan that define an instance
+InstanceFields = Mapping[str, Any]  # the fields of a plan that define an instance
 Row = Mapping[str, Any]  # of a ledger
 Indices = Array | NDArray[np.int64]  # of rows
 
@@ -78,11 +78,11 @@ class Kind(Protocol):
         """Return the figures of a row, and its other data by the names of `data`."""
         ...
 
-    def rank(self, place: Place) -> tuple[Any, ...]:
+    def instance_order(self, fields: InstanceFields) -> tuple[Any, ...]:
         """Return the key by which instances are sorted."""
         ...
 
-    def place_name(self, place: Place) -> str:
+    def instance_name(self, fields: InstanceFields) -> str:
         """Return an instance's name."""
         ...
 
@@ -109,8 +109,8 @@ class Kind(Protocol):
         """Return the baselines, on the same runs as the methods."""
         ...
 
-    def place_words(self, contest: "Contest") -> str:
-        """Return the instances of a contest in words."""
+    def instance_words(self, contest: "Contest") -> str:
+        """Return what the instances of a contest are, in words."""
         ...
 
     def baseline_sentences(
@@ -157,7 +157,7 @@ class Runs:
         methods: The names of methods, the best mean score first.
         variants: The fields that define each method.
         instances: The names of instances.
-        places: The fields that define each instance.
+        instance_fields: The fields that define each instance.
         method: The index (n,) of each row's method.
         instance: The index (n,) of each row's instance.
         seed: The index (n,) of each row's seed.
@@ -176,7 +176,7 @@ class Runs:
     methods: tuple[str, ...]
     variants: tuple[dict[str, Any], ...]
     instances: tuple[str, ...]
-    places: tuple[dict[str, Any], ...]
+    instance_fields: tuple[dict[str, Any], ...]
     method: Array
     instance: Array
     seed: Array
@@ -234,7 +234,7 @@ class Runs:
 
     def values(self, field: str) -> list[Any]:
         """Return the distinct values of a field of methods or instances, rising."""
-        definitions = (*self.variants, *self.places)
+        definitions = (*self.variants, *self.instance_fields)
         return sorted({fields[field] for fields in definitions if field in fields})
 
 
@@ -253,7 +253,7 @@ class Contest(Shared):
         """The figure (methods, blocks) that orders the methods."""
         return self.of(self.runs.kind.score.name)
 
-    def data(self, name: str, rows: Array | NDArray[np.int64]) -> Sequence[Any]:
+    def data(self, name: str, rows: Indices) -> Sequence[Any]:
         """Return the other data of rows, which are indices of any shape, in order."""
         return Ordered(self.runs.data[name], rows.ravel().astype(np.int64))
 
@@ -284,9 +284,9 @@ class Contest(Shared):
         """The indices of the shared instances, rising."""
         return tuple(np.unique(self.instance).tolist())
 
-    def place_field(self, name: str) -> Array:
+    def instance_field(self, name: str) -> Array:
         """Return a field of the plan (blocks,) for each block's instance."""
-        values = np.array([place[name] for place in self.runs.places])
+        values = np.array([fields[name] for fields in self.runs.instance_fields])
         return np.asarray(values[self.instance])
 
     @property

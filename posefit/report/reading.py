@@ -16,8 +16,9 @@ from posefit.report.searches import SEARCHES
 from posefit.report.stored import Ordered, Store
 from posefit.report.tracks import TRACKS
 from posefit.settings import setting_text
-from posefit.sweep.cell import cell_from, json_of, other_version
+from posefit.sweep.cell import cell_from, json_of
 from posefit.sweep.repeat import repeat_command
+from posefit.sweep.versions import other_version
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -62,7 +63,7 @@ class _Finished:
     """
 
     def __init__(self, kind: Kind) -> None:
-        self.place = array("q")
+        self.instance = array("q")
         self.method = array("q")
         self.seed = array("q")  # its place in `seeds`
         self.seeds: dict[int, int] = {}  # in their order, of any size
@@ -74,13 +75,18 @@ class _Finished:
             self.data[name] = store()
 
     def add(
-        self, row: Row, place: int, method: int, figures: Array, data: dict[str, Any]
+        self,
+        row: Row,
+        instance: int,
+        method: int,
+        figures: Array,
+        data: dict[str, Any],
     ) -> None:
         """Add a row with the numbers of its instance and method.
 
         Args:
             row: The row.
-            place: The number of its instance.
+            instance: The number of its instance.
             method: The number of its method.
             figures: Its figures.
             data: Its other data by name.
@@ -91,7 +97,7 @@ class _Finished:
             column.append(figure)
         for name, store in self.data.items():
             store.append(data[name])
-        self.place.append(place)
+        self.instance.append(instance)
         self.method.append(method)
         seed = int(row["spec"]["seed"])
         self.seed.append(self.seeds.setdefault(seed, len(self.seeds)))
@@ -104,7 +110,7 @@ class _Rows(NamedTuple):
 
     kind: Kind
     variants: list[dict[str, Any]]  # the fields that define each method
-    places: list[dict[str, Any]]  # the fields that define each instance
+    instances: list[dict[str, Any]]  # the fields that define each instance
     finished: _Finished
     # each quarantined cell with the number of its method
     quarantined: list[tuple[int, Row]]
@@ -138,14 +144,16 @@ def runs_of(
     table = rows.finished
     seeds = list(table.seeds)
 
-    def place_key(place: int) -> tuple[Any, ...]:
-        return kind.rank(rows.places[place]), json_of(rows.places[place])
+    def instance_key(number: int) -> tuple[Any, ...]:
+        fields = rows.instances[number]
+        return kind.instance_order(fields), json_of(fields)
 
     # the rows of these methods, sorted by instance, method and seed
     method_of_row = np.array(table.method, dtype=np.int64)
     numbers = np.flatnonzero(np.isin(method_of_row, chosen))
     finished, method = _ranked(method_of_row[numbers], chosen.index)
-    place_order, instance = _ranked(np.array(table.place)[numbers], place_key)
+    instance_numbers = np.array(table.instance)[numbers]
+    instance_order, instance = _ranked(instance_numbers, instance_key)
     seed_order, seed = _ranked(np.array(table.seed)[numbers], seeds.__getitem__)
     order = np.lexsort((seed, method, instance))
     numbers = numbers[order]
@@ -166,14 +174,14 @@ def runs_of(
     for m, cell in rows.quarantined:
         if m in chosen:
             failures.append(_failure(cell, label_of[m]))
-    places = [rows.places[i] for i in place_order]
+    instance_fields = [rows.instances[number] for number in instance_order]
     return Runs(
         kind=kind,
         version=ledger.version,
         methods=tuple(label_of[m] for m in finished),
         variants=tuple(rows.variants[m] for m in finished),
-        instances=_instance_names(kind, places),
-        places=tuple(places),
+        instances=_instance_names(kind, instance_fields),
+        instance_fields=tuple(instance_fields),
         method=method[order],
         instance=instance[order],
         seed=seed[order],
@@ -218,7 +226,7 @@ def _read(ledger: "Ledger") -> _Rows:
     searches.
     """
     variants = _Distinct()
-    places = _Distinct()
+    instances = _Distinct()
     finished: _Finished | None = None
     quarantined = list[tuple[int, Row]]()
     kinds = set[str]()
@@ -239,7 +247,8 @@ def _read(ledger: "Ledger") -> _Rows:
                 quarantined.append((method, row))
                 continue
             figures, data = kind.read(row)
-            finished.add(row, places.number(_place(spec)), method, figures, data)
+            instance = instances.number(_instance_fields(spec))
+            finished.add(row, instance, method, figures, data)
         # raised if a value is missing or has another type
         except (ValueError, TypeError, LookupError, AttributeError) as error:
             raise ledger.damaged_row(row["key"], error) from None
@@ -247,7 +256,7 @@ def _read(ledger: "Ledger") -> _Rows:
         raise InputError(
             f"{ledger.path}: expected a ledger with finished rows, got none"
         )
-    return _Rows(kind, variants.values, places.values, finished, quarantined)
+    return _Rows(kind, variants.values, instances.values, finished, quarantined)
 
 
 def _labels(rows: _Rows, latest: bool) -> dict[int, str]:
@@ -258,7 +267,7 @@ def _labels(rows: _Rows, latest: bool) -> dict[int, str]:
     variants = rows.variants
     score = rows.kind.score
     scores = np.array(rows.finished.figures[score.name], dtype=np.float64)
-    badness = np.nan_to_num(-scores if score.down else scores, nan=np.inf)
+    badness = np.nan_to_num(-scores if score.higher_is_better else scores, nan=np.inf)
     method = np.array(rows.finished.method, dtype=np.int64)
 
     def order(m: int) -> tuple[bool, float, str]:
@@ -277,15 +286,15 @@ def _labels(rows: _Rows, latest: bool) -> dict[int, str]:
     return dict(zip(best_first, names, strict=True))
 
 
-def _instance_names(kind: Kind, places: Sequence[dict[str, Any]]) -> tuple[str, ...]:
-    """Return the distinct names of instances."""
+def _instance_names(kind: Kind, instances: Sequence[dict[str, Any]]) -> tuple[str, ...]:
+    """Return the distinct names of instances, which are given by their fields."""
     details = []
-    for place in places:
+    for fields in instances:
         texts = {}
-        for name, value in place.items():
+        for name, value in fields.items():
             texts[name] = value if isinstance(value, str) else json_of(value)
         details.append(texts)
-    return distinct([kind.place_name(place) for place in places], details)
+    return distinct([kind.instance_name(fields) for fields in instances], details)
 
 
 def _latest(variants: Sequence[Mapping[str, Any]]) -> list[int]:
@@ -330,7 +339,7 @@ def _failure(cell: Mapping[str, Any], name: str) -> Failure:
     return Failure(
         name=printable(str(cell_from({**cell["spec"], "name": name}))),
         method=name,
-        key=cell["key"][:8],
+        key=cell["key"][:KEY_LENGTH],
         reasons=tuple(map(printable, dict.fromkeys(cell["reasons"]))),
         command=repeat_command(cell["spec"]),
     )
@@ -361,7 +370,7 @@ def _variation(variant: Mapping[str, Any]) -> dict[str, str]:
     return texts
 
 
-def _place(spec: Mapping[str, Any]) -> dict[str, Any]:
+def _instance_fields(spec: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields that define an instance."""
     fields = {}
     for name, value in spec.items():

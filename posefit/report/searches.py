@@ -12,7 +12,7 @@ from posefit.evaluation.measures import Measure
 from posefit.reading import counted
 from posefit.report.charts import Chart, Line
 from posefit.report.columns import Column, Score, listed, median
-from posefit.report.contest import Baseline, Contest, Indices, Place, Row, Runs
+from posefit.report.contest import Baseline, Contest, Indices, InstanceFields, Row, Runs
 from posefit.report.stored import Store
 from posefit.statistics.means import mean_interval, mean_intervals
 from posefit.statistics.profiles import attained, hits
@@ -99,14 +99,19 @@ class Searches:
         figures = np.array(list(self.computed(row).values()))
         return figures, {"runs": run, "hits": _hits(run)}
 
-    def rank(self, place: Place) -> tuple[Any, ...]:
+    def instance_order(self, fields: InstanceFields) -> tuple[Any, ...]:
         """Return the key by which instances are sorted."""
-        return place["function"], place["dimension"], place["instance"], place["suite"]
+        return (
+            fields["function"],
+            fields["dimension"],
+            fields["instance"],
+            fields["suite"],
+        )
 
-    def place_name(self, place: Place) -> str:
+    def instance_name(self, fields: InstanceFields) -> str:
         """Return an instance's name, such as `f7 in 24D, instance 3`."""
-        problem = f"f{place['function']} in {place['dimension']}D"
-        return f"{problem}, instance {place['instance']}"
+        problem = f"f{fields['function']} in {fields['dimension']}D"
+        return f"{problem}, instance {fields['instance']}"
 
     def facts(self, runs: Runs) -> dict[str, Any]:
         """Return the facts about the runs by their titles."""
@@ -132,7 +137,9 @@ class Searches:
         A block is an instance of a function, which has the same pose in every
         dimension. Its share is the mean over seeds and dimensions.
         """
-        fields = [contest.place_field(n) for n in ("function", "instance", "suite")]
+        fields = [
+            contest.instance_field(name) for name in ("function", "instance", "suite")
+        ]
         poses = [*zip(*(field.tolist() for field in fields), strict=True)]
         index = {pose: k for k, pose in enumerate(dict.fromkeys(poses))}
         block = np.array([index[pose] for pose in poses])  # (runs,)
@@ -147,8 +154,8 @@ class Searches:
 
     def interval(self, contest: Contest, place: int) -> tuple[float, float]:
         """Return the ends of the interval that other instances would give."""
-        functions = contest.place_field("function")
-        instances = contest.place_field("instance")
+        functions = contest.instance_field("function")
+        instances = contest.instance_field("instance")
         mean = mean_interval(contest.scores[place], functions, instances)
         return max(mean.low, 0.0), min(mean.high, 100.0)
 
@@ -162,14 +169,14 @@ class Searches:
             return []
         return [Baseline(RANDOM, "random search", {SCORE.name: max(shares)})]
 
-    def place_words(self, contest: Contest) -> str:
+    def instance_words(self, contest: Contest) -> str:
         """Return the functions, dimensions and instances of a contest in words."""
-        functions = sorted(set(contest.place_field("function").tolist()))
-        dimensions = sorted(set(contest.place_field("dimension").tolist()))
+        functions = sorted(set(contest.instance_field("function").tolist()))
+        dimensions = sorted(set(contest.instance_field("dimension").tolist()))
         problems = set()
         for i in contest.instances:
-            place = contest.runs.places[i]
-            problems.add((place["function"], place["instance"]))
+            fields = contest.runs.instance_fields[i]
+            problems.add((fields["function"], fields["instance"]))
         noun = "function" if len(functions) == 1 else "functions"
         words = f"{noun} {listed(functions, len(functions))}"
         words += f" in {listed(dimensions, len(dimensions))} dimensions"
@@ -206,9 +213,9 @@ def search_charts(contest: Contest) -> list[Chart]:
     There is one of all functions, and one of each. Intervals show what other instances
     would give.
     """
-    functions = contest.place_field("function")
-    dimensions = contest.place_field("dimension")
-    instances = contest.place_field("instance")
+    functions = contest.instance_field("function")
+    dimensions = contest.instance_field("dimension")
+    instances = contest.instance_field("instance")
     runs = contest.data("runs", contest.blocks)
     most = max(float(run.evaluations[-1]) / run.dimension for run in runs)
     evaluations = np.unique(np.geomspace(1.0, max(most, 1.0), POINTS))
@@ -220,7 +227,7 @@ def search_charts(contest: Contest) -> list[Chart]:
         [[attained(times, evaluations) for times in rows] for rows in hits_of_runs]
     )
     numbers = np.unique(functions).tolist()
-    parts = {"All functions": functions > 0}
+    parts = {"All functions": np.ones(len(functions), dtype=bool)}
     if len(numbers) > 1:
         parts |= {_function(number): functions == number for number in numbers}
     charts: list[Chart] = []

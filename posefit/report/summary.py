@@ -37,7 +37,7 @@ def leader_sentences(standings: Standings) -> list[str]:
     unclear = [pair for pair in tested if pair[1].adjusted >= SIGNIFICANCE]
     worse = [pair for pair in shown if pair[1].difference > 0.0]
     better = [pair for pair in shown if pair[1].difference <= 0.0]
-    where = f"{kind.place_words(contest)} with {contest.seed_words}"
+    where = f"{kind.instance_words(contest)} with {contest.seed_words}"
     facts = f"{_value(contest, first)} on {where}"
     if worse:
         text = f"{first.name} {facts}; it leads {_led(contest, worse)}."

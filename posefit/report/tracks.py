@@ -19,7 +19,7 @@ from posefit.measuring.centres import PLACES
 from posefit.reading import counted
 from posefit.report import charts
 from posefit.report.columns import NAMED, Column, Score, listed
-from posefit.report.contest import Baseline, Contest, Indices, Place, Row, Runs
+from posefit.report.contest import Baseline, Contest, Indices, InstanceFields, Row, Runs
 from posefit.report.stored import Packed, Store, Traces
 from posefit.sweep.repeat import END, TRACK_BEGIN, plan_lines, track_fields
 from posefit.sweep.table import damage, views
@@ -176,34 +176,38 @@ class Tracks:
         modes = _binned(row["mode_reliability"])
         return figures, {"joint_errors": joints, "modes": modes, "traces": trace}
 
-    def rank(self, place: Place) -> tuple[Any, ...]:
+    def instance_order(self, fields: InstanceFields) -> tuple[Any, ...]:
         """Return the key by which instances are sorted: undamaged ones come first."""
-        corruption = sorted(place["corruption"].items())
+        corruption = sorted(fields["corruption"].items())
         return (
-            place["motion"],
-            place["view_degrees"],
+            fields["motion"],
+            fields["view_degrees"],
             len(corruption),
             corruption,
-            place["instance"],
+            fields["instance"],
         )
 
-    def place_name(self, place: Place) -> str:
+    def instance_name(self, fields: InstanceFields) -> str:
         """Return an instance's name, such as `walk, view 45°, instance 1`."""
-        directions = ", ".join(f"{view}°" for view in views(place))
-        first = f"{place['motion']}, view {directions}"
-        return ", ".join([first, *damage(place), f"instance {place['instance']}"])
+        directions = ", ".join(f"{view}°" for view in views(fields))
+        first = f"{fields['motion']}, view {directions}"
+        return ", ".join([first, *damage(fields), f"instance {fields['instance']}"])
 
     def facts(self, runs: Runs) -> dict[str, Any]:
         """Return the facts about the runs by their titles."""
-        frames = np.array([place["frames"] for place in runs.places], dtype=int)
+        frames = np.array(
+            [fields["frames"] for fields in runs.instance_fields], dtype=int
+        )
         seconds = runs.figures["seconds_per_frame"] * frames[runs.instance]
         hours = float(np.nansum(seconds) / 3600.0)
         time = f"{hours:.1f} hours" if hours >= 0.1 else f"{60 * hours:.1f} minutes"
         seeds = [*map(str, runs.seeds[:MAX_SEEDS])]
         if len(runs.seeds) > MAX_SEEDS:
             seeds.append(f"… ({len(runs.seeds):,})")
-        directions = {", ".join(views(place)) for place in runs.places}
-        corruptions = {", ".join(damage(place)) or "none" for place in runs.places}
+        directions = {", ".join(views(fields)) for fields in runs.instance_fields}
+        corruptions = {
+            ", ".join(damage(fields)) or "none" for fields in runs.instance_fields
+        }
         budgets = [f"{budget:,}" for budget in runs.values("evaluations")]
         return {
             "instances": f"{len(runs.instances):,}",
@@ -252,9 +256,9 @@ class Tracks:
             baselines.append(Baseline(name, title, {LOSS: errors[name], **skills}))
         return baselines
 
-    def place_words(self, contest: Contest) -> str:
+    def instance_words(self, contest: Contest) -> str:
         """Return the instances of a contest in words: `4 instances of run and walk`."""
-        motions = sorted(set(contest.place_field("motion").tolist()))
+        motions = sorted(set(contest.instance_field("motion").tolist()))
         names = listed(motions) if len(motions) <= NAMED else f"{len(motions)} motions"
         return f"{counted(len(contest.instances), 'instance')} of {names}"
 
@@ -303,14 +307,18 @@ class Tracks:
         return {
             **part,
             "sections": sections,
-            "joints": [place.replace("_", " ") for place in PLACES],
+            "joints": [joint.replace("_", " ") for joint in PLACES],
             "rows": rows,
             "seeds": [*map(str, runs.seeds)],
             # a command that repeats a row consists of these, with its seed
             "command": {
                 "begin": TRACK_BEGIN,
-                "methods": [plan_lines(track_fields(one)) for one in runs.variants],
-                "instances": [plan_lines(track_fields(one)) for one in runs.places],
+                "methods": [
+                    plan_lines(track_fields(fields)) for fields in runs.variants
+                ],
+                "instances": [
+                    plan_lines(track_fields(fields)) for fields in runs.instance_fields
+                ],
                 "end": END,
             },
         }
@@ -342,8 +350,8 @@ def _binned(modes: Sequence[Sequence[float]]) -> Array:
         return NO_MODES
     bins = np.zeros((BINS, 3), dtype=np.float32)
     for count, probability, right in modes:
-        place = min(int(probability * BINS), BINS - 1)
-        bins[place] += count * np.array([1.0, probability, right])
+        k = min(int(probability * BINS), BINS - 1)
+        bins[k] += count * np.array([1.0, probability, right])
     return np.asarray(bins)
 
 

@@ -1,6 +1,6 @@
 """The command `posefit report`: a page, and on request figures, a CSV and a table."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,7 +11,7 @@ from posefit.reading import cut
 from posefit.report.coco import write_coco
 from posefit.report.content import data_of
 from posefit.report.contest import Runs
-from posefit.report.leaderboard import standings_of
+from posefit.report.leaderboard import Standings, standings_of
 from posefit.report.page import MARK, document
 from posefit.report.reading import is_of, runs_of
 from posefit.report.table import LATEX_MARK, board_lines, latex_table
@@ -30,8 +30,18 @@ class Report(NamedTuple):
     data: dict[str, Any]
 
 
+class _Outputs(NamedTuple):
+    """The paths of what `write_report` writes, None for what is not wanted."""
+
+    out: str | None
+    figures: str | None
+    csv: str | None
+    latex: str | None
+    coco: str | None
+
+
 def write_report(
-    path: str | Sequence[str],
+    path: str | Path | Sequence[str | Path],
     out: str | None,
     *,
     figures: str | None = None,
@@ -67,39 +77,18 @@ def write_report(
         ImportError: Figures are asked for, and matplotlib is not installed.
     """
     paths = [path] if isinstance(path, str | Path) else path
-    if out is not None and Path(out).suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"--out must be a file that ends in .html, got {cut(out)}")
-    for file, mark in ((out, MARK), (csv, CSV_MARK), (latex, LATEX_MARK)):
-        if file is not None:
-            check_replaceable(file, mark.encode())
-    _check_distinct(Path(paths[0]), [out, figures, csv, latex, coco])
-    if coco is not None:
-        check_new(coco)
-    if figures is not None:
-        from posefit.report.figures import check_folder, empty_figure, write_figures
-
-        check_folder(figures)
-        empty_figure()
+    outputs = _Outputs(out, figures, csv, latex, coco)
+    _check_paths(paths, outputs)
     with Ledger(*paths) as ledger:
         runs = runs_of(ledger, methods, latest=latest)
-        if runs.kind.name == "search" and figures is not None:
-            raise InputError(
-                "--figures must be given with a sweep of tracks, "
-                "got one of single searches"
-            )
-        if runs.kind.name != "search" and coco is not None:
-            raise InputError(
-                "--coco must be given with a sweep of single searches, "
-                "got one of tracks"
-            )
         standings = standings_of(runs)
-        for option, place in (("--figures", figures), ("--latex", latex)):
-            if place is not None and standings is None:
-                raise InputError(f"{option} must be of runs with errors, got none")
+        _check_runs(runs, standings, outputs)
         data = data_of(ledger, runs, standings)
         if out is not None:
             _write(out, MARK, document(data))
         if figures is not None and standings is not None:
+            from posefit.report.figures import write_figures
+
             write_figures(standings, figures)
         if csv is not None:
             with replaced_file(csv, CSV_MARK.encode()) as building:
@@ -108,6 +97,53 @@ def write_report(
             write_coco(runs, coco)
         if latex is not None and standings is not None:
             _write(latex, LATEX_MARK, [latex_table(standings)])
+    lines = _lines(data, standings)
+    if out is not None:
+        lines.append(f"written to {out}: open it in any browser")
+    printed = plain({name: data[name] for name in PRINTED if name in data})
+    return Report(lines, {"out": out, "kind": runs.kind.name, **dict(printed)})
+
+
+def _check_paths(ledgers: Sequence[str | Path], outputs: _Outputs) -> None:
+    """Raise an error if an output cannot be written where it is to be.
+
+    What the ledger holds does not matter here, so this comes before it is read.
+    """
+    out = outputs.out
+    if out is not None and Path(out).suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"--out must be a file that ends in .html, got {cut(out)}")
+    marks = ((out, MARK), (outputs.csv, CSV_MARK), (outputs.latex, LATEX_MARK))
+    for file, mark in marks:
+        if file is not None:
+            check_replaceable(file, mark.encode())
+    _check_distinct(ledgers, outputs)
+    if outputs.coco is not None:
+        check_new(outputs.coco)
+    if outputs.figures is not None:
+        from posefit.report.figures import check_folder, empty_figure
+
+        check_folder(outputs.figures)
+        empty_figure()  # raises if matplotlib is missing
+
+
+def _check_runs(runs: Runs, standings: Standings | None, outputs: _Outputs) -> None:
+    """Raise InputError if an output cannot be made of these runs."""
+    if runs.kind.name == "search" and outputs.figures is not None:
+        raise InputError(
+            "--figures must be given with a sweep of tracks, got one of single searches"
+        )
+    if runs.kind.name != "search" and outputs.coco is not None:
+        raise InputError(
+            "--coco must be given with a sweep of single searches, got one of tracks"
+        )
+    compared = (("--figures", outputs.figures), ("--latex", outputs.latex))
+    for option, path in compared:
+        if path is not None and standings is None:
+            raise InputError(f"{option} must be of runs with errors, got none")
+
+
+def _lines(data: Mapping[str, Any], standings: Standings | None) -> list[str]:
+    """Return the printed leader, problems and leaderboard of a page's data."""
     lines = []
     if standings is not None:
         lines += data["answer"]
@@ -115,10 +151,7 @@ def write_report(
         lines += [text, *(f"  {detail}" for detail in details)]
     if standings is not None:
         lines += board_lines(standings)
-    if out is not None:
-        lines.append(f"written to {out}: open it in any browser")
-    printed = plain({name: data[name] for name in PRINTED if name in data})
-    return Report(lines, {"out": out, "kind": runs.kind.name, **dict(printed)})
+    return lines
 
 
 def _write(path: str, mark: str, parts: Iterable[str]) -> None:
@@ -145,14 +178,16 @@ def _csv_rows(ledger: Ledger, runs: Runs) -> Iterator[dict[str, Any]]:
         yield {**columns, "command": repeat_command(row["spec"])}
 
 
-def _check_distinct(ledger: Path, places: Sequence[str | None]) -> None:
+def _check_distinct(ledgers: Sequence[str | Path], outputs: _Outputs) -> None:
     """Raise InputError if a path is used twice, or its folder does not exist."""
-    paths = [place for place in places if place is not None]
-    resolved = [Path(place).resolve() for place in paths]
-    for place, path in zip(paths, resolved, strict=True):
-        if path == ledger.resolve() or resolved.count(path) > 1:
+    used = {Path(ledger).resolve() for ledger in ledgers}
+    paths = [path for path in outputs if path is not None]
+    for path in paths:
+        resolved = Path(path).resolve()
+        if resolved in used:
             raise InputError(
-                f"two outputs, or an output and the ledger, have the same path: {place}"
+                f"two outputs, or an output and the ledger, have the same path: {path}"
             )
-    for place in paths:
-        check_place(place)
+        used.add(resolved)
+    for path in paths:
+        check_place(path)

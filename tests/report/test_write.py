@@ -179,6 +179,23 @@ def test_a_ledger_whose_every_cell_failed_has_a_page_with_the_reasons(
     ]
 
 
+def test_a_failure_beside_a_run_without_an_error_is_not_every_cell(
+    tmp_path: Path,
+) -> None:
+    row = result(FIRST, 1.0, error_degrees=None, baselines_degrees=None)
+    made = ledger(tmp_path / "results", [row], LOST)
+    with Ledger(made) as opened:
+        runs = runs_of(opened)
+        answer = data_of(opened, runs, standings_of(runs))["answer"]
+    assert answer == ["No run has an error: nothing can be compared."]
+
+
+def test_no_output_has_the_path_of_any_ledger(results: Path, tmp_path: Path) -> None:
+    other = ledger(tmp_path / "other", [result(replace(FIRST, seed=20), 1.0)])
+    message = error_of("report", results, other, "--coco", other)
+    assert f"an output and the ledger, have the same path: {other}" in message
+
+
 def test_figures_tables_and_rows_on_demand(results: Path, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     figures = tmp_path / "figures"
