@@ -468,11 +468,11 @@ def field_distance(x, y, contour):
 
 
 @inlined
-def _project_joints(camera, frames, centres, scales, moves):
-    """Write the joints' pixels (27, 2), the pixels of a metre there (27,), and `moves`.
+def _project_joints(camera, frames, centres, per_metre, moves):
+    """Write the joints' pixels (27, 2), the pixels per metre there (27,), and `moves`.
 
     `moves` (27, 3, 3) has the derivatives by a joint's place: of its column, of its
-    row, and of the pixels of a metre.
+    row, and of the pixels per metre.
     """
     rotation, translation, focal, centre = camera
     for j in range(frames.shape[0]):
@@ -485,11 +485,11 @@ def _project_joints(camera, frames, centres, scales, moves):
         c = max(_camera_coordinate(2, rotation, translation, x, y, z), NEAR)
         centres[j, 0] = a / c * focal[0] + centre[0]
         centres[j, 1] = b / c * focal[1] + centre[1]
-        scales[j] = math.sqrt(focal[0] * focal[1]) / c
+        per_metre[j] = math.sqrt(focal[0] * focal[1]) / c
         for i in range(3):  # contour (7)
             moves[j, 0, i] = focal[0] / c * (rotation[0, i] - a / c * rotation[2, i])
             moves[j, 1, i] = focal[1] / c * (rotation[1, i] - b / c * rotation[2, i])
-            moves[j, 2, i] = -scales[j] / c * rotation[2, i]
+            moves[j, 2, i] = -per_metre[j] / c * rotation[2, i]
 
 
 @inlined
@@ -510,7 +510,7 @@ def _write_twist_rows(b, parent, radii, frames, moves, rows):
         y = frames[joint, 3, 1]
         z = frames[joint, 3, 2]
         for kind in range(3):
-            # a radius in pixels is one in metres times the pixels of a metre
+            # a radius in pixels is one in metres times the pixels per metre
             factor = radii[b, end] if kind == 2 else 1.0
             mx = factor * moves[joint, kind, 0]
             my = factor * moves[joint, kind, 1]
@@ -558,20 +558,20 @@ def add_view(parents, radii, camera, frames, contour, reach, grown, sums):
     hessians, forces = sums
     count = parents.size
     centres = np.empty((count + 1, 2))
-    scales = np.empty(count + 1)
+    per_metre = np.empty(count + 1)
     moves = np.empty((count + 1, 3, 3))
-    _project_joints(camera, frames, centres, scales, moves)
+    _project_joints(camera, frames, centres, per_metre, moves)
     drawn_radii = np.empty((count, 2))
     for b in range(count):
-        drawn_radii[b, 0] = scales[parents[b]] * radii[b, 0]
-        drawn_radii[b, 1] = scales[b + 1] * radii[b, 1]
-    metre = scales[0]  # pixels of a metre at the root
-    scale = max(reach * metre, MIN_ROBUST_SCALE)
+        drawn_radii[b, 0] = per_metre[parents[b]] * radii[b, 0]
+        drawn_radii[b, 1] = per_metre[b + 1] * radii[b, 1]
+    root_per_metre = per_metre[0]
+    scale = max(reach * root_per_metre, MIN_ROBUST_SCALE)
     blocks = np.zeros((count, 6, 6))
     gradients = np.zeros((count, 6))
     accumulate_borders(parents, centres, drawn_radii, contour, scale, blocks, gradients)
-    variance = BORDER_DEVIATION**2 + (PIXEL_DEVIATION / metre) ** 2
-    worth = 1.0 / (metre**3 * CORRELATION_LENGTH * variance)  # contour (6)
+    variance = BORDER_DEVIATION**2 + (PIXEL_DEVIATION / root_per_metre) ** 2
+    worth = 1.0 / (root_per_metre**3 * CORRELATION_LENGTH * variance)  # contour (6)
     rows = np.empty((6, 6))
     work = np.empty((6, 6))
     for b in range(count):
@@ -579,11 +579,13 @@ def add_view(parents, radii, camera, frames, contour, reach, grown, sums):
         _write_twist_rows(b, parents[b], radii, frames, moves, rows)
         _accumulate_twists(rows, drawn, worth, work, hessians[b + 1], forces[b + 1])
         if len(grown.joints):
-            _add_growth(b, parents[b], rows, scales, drawn, worth, grown, forces[b + 1])
+            _add_growth(
+                b, parents[b], rows, per_metre, drawn, worth, grown, forces[b + 1]
+            )
 
 
 @jit
-def _add_growth(b, parent, rows, scales, drawn, worth, grown, forces):
+def _add_growth(b, parent, rows, per_metre, drawn, worth, grown, forces):
     """Add bone b's normal equations by F factors of the build. contour (14).
 
     Column 0 is for the residuals, and column 1 + f for factor f: with the gradient
@@ -593,7 +595,7 @@ def _add_growth(b, parent, rows, scales, drawn, worth, grown, forces):
         b: the bone.
         parent: the joint where it starts.
         rows: derivatives (6, 6) of the bone's numbers by a twist, from (8).
-        scales: the pixels of a metre at each joint.
+        per_metre: the pixels per metre at each joint.
         drawn: the Hessian and the gradient by the bone's numbers, from (5).
         worth: the weight of the view's residuals, from (6).
         grown: the derivatives by the factors; its `squares` are added to.
@@ -612,7 +614,7 @@ def _add_growth(b, parent, rows, scales, drawn, worth, grown, forces):
                 for i in range(3):
                     changes[k, 1 + f] += rows[k, i] * grown.joints[f, joint, i]
                 if kind == 2:
-                    changes[k, 1 + f] += scales[joint] * grown.radii[f, b, end]
+                    changes[k, 1 + f] += per_metre[joint] * grown.radii[f, b, end]
     for k in range(6):
         changed[k, 0] = worth * gradient[k]
         for i in range(6):

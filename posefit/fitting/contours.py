@@ -17,7 +17,7 @@ from posefit.fitting import contour_kernels as kernels
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.skeleton import ANGLES, BONES, JOINTS
+from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, Skeleton
 from posefit.silhouette.drawn import count_poses
 from posefit.silhouette.mask import (
     Mask,
@@ -27,9 +27,24 @@ from posefit.silhouette.mask import (
 )
 from posefit.silhouette.sharing import shares_of, work_through
 
-# pixels of a metre; of a finer mask only every second, third or later pixel is used
+# pixels per metre; of a finer mask only every second, third or later pixel is used
 FINE_PIXELS = 80.0
 FIELD_MARGIN = 48  # pixels: distances are known up to this margin around a mask
+# metres, step by step: larger distances count less, because that border may belong to
+# another person, or to a bag
+ROBUST_SCALES = (0.09, 0.09, 0.065, 0.065, 0.045, 0.045, *[0.033] * 6)
+MAX_ANGLE_STEP = np.radians(20.0)  # in one step
+# metres between two points of a mask's border, roughly, in the fit of one frame
+POINT_SPACING = 0.04
+# the evaluations that a step of one frame counts as, measured by docs/studies/follow.py
+STEP_EVALUATIONS = 27.0
+# for each round of a race, the scales of its steps and the share of the poses that take
+# part: the cheapest ones
+ROUNDS: Sequence[tuple[Sequence[float], float]] = (
+    ((0.09, 0.065), 1.0),
+    ((0.065, 0.045, 0.045), 0.33),
+    ((0.033,) * 8, 0.1),
+)
 
 Distances = NDArray[np.float32]
 Integers = NDArray[np.int64]
@@ -44,7 +59,6 @@ class MaskContours:
 
     # all pixels below are this camera's; for fine masks it is coarser than the masks'
     camera: Camera
-    metres: Array  # (T,) pixels of a metre at the person's distance
     step: float  # pixels of the border that a point represents
     # (T, h, w) pixels outside the mask, negative within, and 0 if unknown
     fields: Distances = field(repr=False)
@@ -75,14 +89,13 @@ class MaskContours:
             spacing: metres between two points of a border, roughly. Points are at least
                 a pixel apart.
         """
-        metres, factor = coarseness(camera, places)
+        per_metre, factor = coarseness(camera, places)
         camera = coarser_camera(camera, factor)
-        metres = metres / factor
-        step = max(round(float(np.median(metres)) * spacing), 1)
+        step = max(round(float(np.median(per_metre / factor)) * spacing), 1)
         traced = [
             _border(observation, view, factor, step) for observation in observations
         ]
-        points = [part for part, _, _ in traced]
+        points = [border for border, _, _ in traced]
         corners = [corner for _, corner, _ in traced]
         sizes = np.array([distances.shape for _, _, distances in traced])
         fields = np.zeros((len(traced), *sizes.max(axis=0)), dtype=np.float32)
@@ -94,7 +107,6 @@ class MaskContours:
         starts = np.cumsum([0, *map(len, points)])
         return cls(
             camera,
-            metres,
             float(step),
             fields,
             np.array(corners),
@@ -112,7 +124,6 @@ class MaskContours:
         last = self.starts[rows.stop]
         return replace(
             self,
-            metres=self.metres[rows],
             fields=self.fields[rows],
             corners=self.corners[rows],
             sizes=self.sizes[rows],
@@ -166,9 +177,9 @@ def coarseness(camera: Camera, places: Array) -> tuple[Array, int]:
     A mask that is finer than needed is read at every second, third, ... pixel only.
     """
     far = np.maximum(camera.project(places)[1], 0.1)
-    metres = np.sqrt(camera.focal.prod()) / far
-    factor = max(int(np.median(metres) / FINE_PIXELS), 1)
-    return metres, min(factor, camera.width, camera.height)
+    per_metre = np.sqrt(camera.focal.prod()) / far
+    factor = max(int(np.median(per_metre) / FINE_PIXELS), 1)
+    return per_metre, min(factor, camera.width, camera.height)
 
 
 def _border(
@@ -182,20 +193,19 @@ def _border(
     if not observation.usable:
         return nothing
     silhouette = observation.silhouettes[view]
-    first = factor // 2
-    pictures = silhouette.mask, silhouette.valid
-    mask, valid = (
-        np.ascontiguousarray(picture[first::factor, first::factor])
-        for picture in pictures
-    )
-    mask = without_small_pieces(mask)
-    box = rows, columns = padded_box(mask, FIELD_MARGIN)
-    mask, around = mask[box], valid[box] & ~mask[box]  # around: known background
+    # the pixels of `coarser_camera`
+    every = slice(factor // 2, None, factor)
+    valid = np.ascontiguousarray(silhouette.valid[every, every])
+    person = without_small_pieces(np.ascontiguousarray(silhouette.mask[every, every]))
+    box = padded_box(person, FIELD_MARGIN)
+    mask = person[box]
+    around = valid[box] & ~mask  # the known background
     if not mask.any() or not around.any():
         return nothing
-    pixels = np.concatenate(
-        [_between(mask, around), _between(mask.T, around.T)[:, ::-1]]
-    )
+    upright = _between(mask, around)
+    level = _between(mask.T, around.T)[:, ::-1]
+    pixels = np.concatenate([upright, level])
+    rows, columns = box
     corner = columns.start, rows.start
     return pixels[::step] + np.array(corner), corner, distances_outside(mask, around)
 
@@ -206,12 +216,11 @@ def distances_outside(mask: Mask, around: Mask) -> Distances:
     Distances are negative within the mask, and 0 where neither `mask` nor `around` is
     true.
     """
-    out, within = (
-        cv2.distanceTransform((~part).astype(np.uint8), cv2.DIST_L2, 5) - 0.5
-        for part in (mask, around)
-    )
+    # pixels' centres are half a pixel from the border between them
+    outside = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 5) - 0.5
+    within = cv2.distanceTransform((~around).astype(np.uint8), cv2.DIST_L2, 5) - 0.5
     return np.asarray(
-        np.where(mask, -within, np.where(around, out, 0.0)), dtype=np.float32
+        np.where(mask, -within, np.where(around, outside, 0.0)), dtype=np.float32
     )
 
 
@@ -220,6 +229,11 @@ def _between(mask: Mask, around: Mask) -> Array:
     meet = (mask[:, 1:] & around[:, :-1]) | (mask[:, :-1] & around[:, 1:])
     rows, columns = np.nonzero(meet)
     return np.column_stack([columns + 1.0, rows + 0.5])
+
+
+def _free_numbers(skeleton: Skeleton) -> Integers:
+    """Return the indices of the numbers of a place and a pose that may change."""
+    return np.flatnonzero(np.append([True] * 3, skeleton.free))
 
 
 class ContourSquares(NamedTuple):
@@ -261,34 +275,26 @@ def contour_squares(
     """
     skeleton = body.skeleton
     count = len(poses)
-    grown = grown or [
-        (np.empty((count, 0, len(JOINTS), 3)), np.empty((0, len(BONES), 2)))
-    ] * len(views)
+    if not grown:
+        no_joints = np.empty((count, 0, len(JOINTS), 3))
+        no_radii = np.empty((0, len(BONES), 2))
+        grown = [(no_joints, no_radii)] * len(views)
     factors = len(grown[0][1])
     placed = skeleton.frames(poses, places)
     squares = np.zeros((1 + factors, 1 + factors))
-    bones = [np.zeros((count, len(JOINTS), 6, columns)) for columns in (6, 1 + factors)]
-    sums = kernels.BoneSquares(*bones)
-    for view, (wider, larger) in zip(views, grown, strict=True):
-        view.add(body, placed[0], scale, kernels.Growth(wider, larger, squares), sums)
-    free = np.flatnonzero(np.append([True] * 3, skeleton.free))
-    hessians, gradients = (
-        np.empty((count, len(free), size)) for size in (len(free), 1 + factors)
+    sums = kernels.BoneSquares(
+        hessians=np.zeros((count, len(JOINTS), 6, 6)),
+        forces=np.zeros((count, len(JOINTS), 6, 1 + factors)),
     )
+    for view, (joints, radii) in zip(views, grown, strict=True):
+        view.add(body, placed[0], scale, kernels.Growth(joints, radii, squares), sums)
+    free = _free_numbers(skeleton)
+    hessians = np.empty((count, len(free), len(free)))
+    gradients = np.empty((count, len(free), 1 + factors))
     kernels.add_all_bones(skeleton.chain, placed, sums, free, (hessians, gradients))
     return ContourSquares(
         hessians, gradients[..., 0], gradients[..., 1:], squares[1:, 1:], squares[1:, 0]
     )
-
-
-# metres, step by step: larger distances count less, because that border may belong to
-# another person, or to a bag
-ROBUST_SCALES = (0.09, 0.09, 0.065, 0.065, 0.045, 0.045, *[0.033] * 6)
-MAX_ANGLE_STEP = np.radians(20.0)  # in one step
-# metres between two points of a mask's border, roughly, in the fit of one frame
-POINT_SPACING = 0.04
-# the evaluations that a step of one frame counts as, measured by docs/studies/follow.py
-STEP_EVALUATIONS = 27.0
 
 
 def fitted(
@@ -312,7 +318,7 @@ def fitted(
         scales: metres, one for each step. Larger distances count less.
         threads: number of threads. Does not change the result.
     """
-    free = np.flatnonzero(np.append([True] * 3, body.skeleton.free))
+    free = _free_numbers(body.skeleton)
     poses = writeable(start[0].copy())
     places = writeable(start[1].copy())
     count_poses(STEP_EVALUATIONS * len(views) * len(poses) * len(scales))
@@ -358,15 +364,6 @@ def _stacked(views: Sequence[MaskContours]) -> kernels.Views:
     )
 
 
-# for each round of a race, the scales of its steps and the share of the poses that take
-# part: the cheapest ones
-ROUNDS: Sequence[tuple[Sequence[float], float]] = (
-    ((0.09, 0.065), 1.0),
-    ((0.065, 0.045, 0.045), 0.33),
-    ((0.033,) * 8, 0.1),
-)
-
-
 def race_count(evaluations: float) -> int:
     """Return how many poses can race within a number of evaluations.
 
@@ -380,11 +377,14 @@ def race_count(evaluations: float) -> int:
 
 
 def _race_evaluations(count: int) -> float:
+    """Return the evaluations of a race, with the costs of its `count` poses."""
     total = float(count)
     for scales, share in ROUNDS:
         remaining = max(int(share * count), 1)
         total += remaining * len(scales) * STEP_EVALUATIONS
-        total += count * (remaining < count)
+        # the costs that choose the cheapest poses
+        if remaining < count:
+            total += count
     return total
 
 
@@ -412,7 +412,8 @@ def contour_race(
     Returns:
         All poses and places, and the number of evaluations. A step counts as 27.
     """
-    poses, places = (array.copy() for array in start)
+    poses = start[0].copy()
+    places = start[1].copy()
     evaluations = 0
     for scales, share in ROUNDS:
         rows = np.arange(len(poses))
@@ -444,9 +445,10 @@ def contour_fit(
     deviations: tuple[float, float],
     evaluations: int,
 ) -> tuple[Array, Array, int]:
-    """Return a pose and a place fitted to the contours of the masks, and the cost.
+    """Return a pose and a place fitted to a frame's contours, and the evaluations.
 
-    Up to twelve Gauss-Newton steps are made. Each costs as much as 27 evaluations.
+    Up to twelve Gauss-Newton steps are made. Each takes as long as 27 evaluations, and
+    counts as that many.
 
     Args:
         task: the body and the cameras.
@@ -454,11 +456,11 @@ def contour_fit(
         start: the pose (66,) and the place (3,) to begin with.
         deviations: the expected errors of the start's angles, in radians, and of its
             place, in metres.
-        evaluations: the most that the fit may cost.
+        evaluations: the most that the fit may take.
 
     Returns:
         The pose (66,), the place (3,), and the number of evaluations that the steps
-        cost.
+        count as.
 
     Example:
         >>> from posefit.plugin import contour_fit
@@ -470,12 +472,12 @@ def contour_fit(
         >>> pose.shape, place.shape, evaluations
         ((66,), (3,), 270)
     """
-    pose, place = (np.array(part, dtype=np.float64)[None] for part in start)
+    pose = np.array(start[0], dtype=np.float64)[None]
+    place = np.array(start[1], dtype=np.float64)[None]
     scales = ROBUST_SCALES[: max(int(evaluations // STEP_EVALUATIONS), 0)]
-    cameras = enumerate(task.cameras)
     views = [
         MaskContours.of(camera, view, [observation], place, POINT_SPACING)
-        for view, camera in cameras
+        for view, camera in enumerate(task.cameras)
     ]
     poses, places = fitted(
         task.body, views, (pose, place), pose, precisions(*deviations), scales

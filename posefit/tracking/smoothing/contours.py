@@ -133,7 +133,7 @@ class Borders:
         """
         first = self._start + int(rows[0])
         last = self._start + int(rows[-1])
-        metres, factor = coarseness(camera, places)
+        _, factor = coarseness(camera, places)
         with self._tracing:
             start, kept, used = self._kept.get(view, (0, None, 0))
             inside = kept is not None and start <= first and last < start + len(kept)
@@ -143,7 +143,7 @@ class Borders:
                 kept = MaskContours.of(camera, view, shown, places)
                 self._kept[view] = start, kept, factor
         part = kept.part(slice(first - start, last + 1 - start))
-        return replace(part.seen_by(camera), metres=metres / factor)
+        return part.seen_by(camera)
 
 
 @dataclass(frozen=True, eq=False)
