@@ -55,7 +55,10 @@ class _Compilation(event.Listener):  # type: ignore[misc]
         self._thread = threading.local()
 
     def on_start(self, event: Any) -> None:
-        """Log a warning, which goes to stderr unless logging is configured."""
+        """Start the time of an outermost compilation, and announce the first one.
+
+        The warning goes to stderr unless logging is configured.
+        """
         depth = getattr(self._thread, "depth", 0)
         if not depth:
             self._thread.began = perf_counter()

@@ -14,9 +14,14 @@ from posefit.silhouette.mask import Mask, box_of
 # numbers of spots at strength 1
 HOLES = 12
 BLOBS = 8
+# shares of the person's height: the mean radii of the spots
+HOLE_RADIUS = 0.03
+BLOB_RADIUS = 0.04
+# share of the person's height: blobs lie up to this far to the left and right
+BLOB_MARGIN = 0.3
 # shares of the person's height at strength 1
-SHADOW = 0.25  # the height of the shadow
-EDGE = 0.02  # the reach of the wandering edge
+SHADOW_HEIGHT = 0.25
+EDGE_LENGTH = 0.02  # the length scale of the rough edge, and half its deviation
 
 
 def corrupted(
@@ -24,7 +29,7 @@ def corrupted(
     noise: Mapping[str, float],
     rng: np.random.Generator,
     *,
-    shows: bool = True,
+    visibly: bool = True,
 ) -> Mask:
     """Return a mask with corruptions.
 
@@ -32,23 +37,24 @@ def corrupted(
         mask: (height, width).
         noise: the strength, 0 to 1, of corruptions by name; see `CORRUPTIONS`.
         rng: the source of random numbers.
-        shows: whether a strength too small to change a pixel is doubled until it does.
+        visibly: whether a strength too small to change a pixel is doubled until it
+            does.
 
     Returns:
         The corrupted mask, or `mask` itself if nothing of it would be left.
 
     """
-    spoilt = mask
+    damaged = mask
     for name, corrupt in CORRUPTIONS.items():
         strength = noise.get(name, 0.0)
-        if strength > 0.0 and spoilt.any():
-            before = spoilt
-            spoilt = corrupt(before, strength, rng)
+        if strength > 0.0 and damaged.any():
+            before = damaged
+            damaged = corrupt(before, strength, rng)
             # otherwise an unchanged frame would count as damaged
-            while shows and strength < 1.0 and np.array_equal(spoilt, before):
+            while visibly and strength < 1.0 and np.array_equal(damaged, before):
                 strength = min(2.0 * strength, 1.0)
-                spoilt = corrupt(before, strength, rng)
-    return spoilt if spoilt.any() else mask
+                damaged = corrupt(before, strength, rng)
+    return damaged if damaged.any() else mask
 
 
 def _discs(
@@ -59,29 +65,30 @@ def _discs(
     `radius` is their mean radius as a share of the person's height.
     """
     left, top, right, bottom = box_of(mask)
-    tall = bottom - top
+    height = bottom - top
+    margin = BLOB_MARGIN * height
     drawn = np.zeros(mask.shape, dtype=np.uint8)
-    where = np.argwhere(mask)
+    person = np.argwhere(mask)  # (n, 2) rows and columns
     for _ in range(count):
         if inside:
-            y, x = where[rng.integers(len(where))]
+            y, x = person[rng.integers(len(person))]
         else:
-            x = rng.uniform(left - 0.3 * tall, right + 0.3 * tall)
+            x = rng.uniform(left - margin, right + margin)
             y = rng.uniform(top, bottom)
-        pixels = max(1, round(radius * tall * rng.uniform(0.5, 1.5)))
+        pixels = max(1, round(radius * height * rng.uniform(0.5, 1.5)))
         cv2.circle(drawn, (int(x), int(y)), pixels, 1, -1)  # filled
     return drawn.astype(bool)
 
 
 def holes(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:
     """Return the mask with round holes, as if clothes matched the background."""
-    spots = _discs(mask, round(HOLES * strength), 0.03, rng, inside=True)
+    spots = _discs(mask, round(HOLES * strength), HOLE_RADIUS, rng, inside=True)
     return np.asarray(mask & ~spots)
 
 
 def blobs(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:
     """Return the mask with round blobs around the person, as if other things moved."""
-    spots = _discs(mask, round(BLOBS * strength), 0.04, rng, inside=False)
+    spots = _discs(mask, round(BLOBS * strength), BLOB_RADIUS, rng, inside=False)
     return np.asarray(mask | spots)
 
 
@@ -92,7 +99,8 @@ def shadow(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:
     """
     bottom = box_of(mask)[3]
     lean = rng.choice([-1.0, 1.0]) * rng.uniform(0.8, 1.2) * strength
-    flat = SHADOW * strength
+    flat = SHADOW_HEIGHT * strength
+    # the person sheared and flattened, with the feet in place
     matrix = np.array([[1.0, -lean, lean * bottom], [0.0, flat, (1.0 - flat) * bottom]])
     height, width = mask.shape
     cast = cv2.warpAffine(
@@ -107,29 +115,29 @@ def occluder(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:
     The bar's width is `strength` times half the person's width.
     """
     left, _, right, _ = box_of(mask)
-    wide = max(1, round(0.5 * strength * (right - left)))
-    start = int(rng.integers(left, max(left + 1, right - wide + 1)))
-    hidden = mask.copy()
-    hidden[:, start : start + wide] = False
-    return hidden
+    width = max(1, round(0.5 * strength * (right - left)))
+    start = int(rng.integers(left, max(left + 1, right - width + 1)))
+    behind = mask.copy()
+    behind[:, start : start + width] = False
+    return behind
 
 
 def jitter(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:
     """Return the mask with an edge that wanders in and out."""
     _, top, _, bottom = box_of(mask)
-    reach = EDGE * strength * (bottom - top)
-    return wandering(mask, 0.0, 2.0 * reach, max(1.0, reach), rng)
+    length = EDGE_LENGTH * strength * (bottom - top)
+    return wandering(mask, 0.0, 2.0 * length, max(1.0, length), rng)
 
 
 def wandering(
-    mask: Mask, rim: float, reach: float, length: float, rng: np.random.Generator
+    mask: Mask, rim: float, deviation: float, length: float, rng: np.random.Generator
 ) -> Mask:
     """Return a mask with its border moved outwards and roughened.
 
     Args:
         mask: (height, width).
         rim: how far the border moves outwards, in pixels.
-        reach: the standard deviation of the border around that, in pixels.
+        deviation: the standard deviation of the border around that, in pixels.
         length: the length scale of the roughness, in pixels.
         rng: the source of random numbers.
 
@@ -143,7 +151,7 @@ def wandering(
     # (height, width) pixels to the border, positive inside
     distance = inside - outside
     return np.asarray(
-        distance + rim + reach * smooth / max(float(smooth.std()), 1e-9) > 0.0
+        distance + rim + deviation * smooth / max(float(smooth.std()), 1e-9) > 0.0
     )
 
 

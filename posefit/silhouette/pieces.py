@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from posefit.arrays import Array
 from posefit.silhouette.mask import Mask, padded_box
 
 # share of the taller piece's height: pieces within this distance are one person
@@ -87,27 +88,10 @@ def _owners(
     count = len(areas)
     large = np.flatnonzero(areas > MIN_PIECE_AREA * areas.max())
     reach = PIECE_REACH * stats[large, cv2.CC_STAT_HEIGHT]
-    shown = labels > 0
-    # the pixels of the pieces, one piece after the other, and where each begins; short
-    # numbers are sorted in a tenth of the time
-    pixels = np.flatnonzero(shown)
-    owned = labels.ravel()[pixels].astype(np.min_scalar_type(count))
-    pixels = pixels[np.argsort(owned, kind="stable")]
-    starts = np.cumsum(np.bincount(owned, minlength=count))[:-1]
-    # pixels from each large piece to every piece
-    distances = np.full((len(large), count), np.inf)
-    for row, number in enumerate(large.tolist()):
-        apart = (labels != number).astype(np.uint8)
-        away = cv2.distanceTransform(apart, cv2.DIST_L2, 3)
-        distances[row, 1:] = np.minimum.reduceat(away.ravel()[pixels], starts)
+    distances = _distances(labels, large, count)
     joined = distances[:, large] <= np.maximum(reach[:, None], reach)
     if known is not None:
-        # pieces are joined if they are one component together with the unknown pixels
-        through = (shown | ~known).astype(np.uint8)
-        numbers = cv2.connectedComponents(through, connectivity=8)[1]
-        parts = np.zeros(count, dtype=np.int64)
-        parts[labels[shown]] = numbers[shown]
-        joined |= np.equal.outer(parts[large], parts[large])
+        joined |= _joined_by_unknown(labels, large, count, known)
         for row, first in enumerate(large.tolist()):
             for column, second in enumerate(large[:row].tolist()):
                 joined[row, column] |= _is_above(stats[first], stats[second])
@@ -121,6 +105,38 @@ def _owners(
     near = distances[nearest, specks] <= reach[nearest]
     owners[specks] = np.where(near, owners[large[nearest]], 0)
     return owners
+
+
+def _distances(labels: NDArray[Any], large: NDArray[np.intp], count: int) -> Array:
+    """Return the pixels (m, count) from each of m large pieces to every piece.
+
+    The first column, the background's, is inf.
+    """
+    # the pixels of the pieces, one piece after the other, and where each begins; short
+    # numbers are sorted in a tenth of the time
+    pixels = np.flatnonzero(labels > 0)
+    numbers = labels.ravel()[pixels].astype(np.min_scalar_type(count))
+    pixels = pixels[np.argsort(numbers, kind="stable")]
+    starts = np.cumsum(np.bincount(numbers, minlength=count))[:-1]
+    distances = np.full((len(large), count), np.inf)
+    for row, number in enumerate(large.tolist()):
+        apart = (labels != number).astype(np.uint8)
+        away = cv2.distanceTransform(apart, cv2.DIST_L2, 3)
+        distances[row, 1:] = np.minimum.reduceat(away.ravel()[pixels], starts)
+    return distances
+
+
+def _joined_by_unknown(
+    labels: NDArray[Any], large: NDArray[np.intp], count: int, known: Mask
+) -> NDArray[np.bool_]:
+    """Return which of m large pieces (m, m) unknown pixels join to one component."""
+    shown = labels > 0
+    through = (shown | ~known).astype(np.uint8)
+    components = cv2.connectedComponents(through, connectivity=8)[1]
+    component_of = np.zeros(count, dtype=np.int64)
+    component_of[labels[shown]] = components[shown]
+    joined = np.equal.outer(component_of[large], component_of[large])
+    return np.asarray(joined, dtype=bool)
 
 
 def _is_above(first: NDArray[np.int32], second: NDArray[np.int32]) -> bool:

@@ -287,7 +287,7 @@ def _noisy(draft: _Draft) -> SuiteInstance:
             dict(zip(DAMAGES, strengths, strict=True)),
             rng,
             # the instances of a published suite must not change
-            shows=False,
+            visibly=False,
         )
         noisy.append(replace(made.frames[0], silhouettes=[Silhouette.of(damaged)]))
     return replace(made, noisy=noisy)
