@@ -183,9 +183,9 @@ class IMM:
         gains = solved[..., :-1].swapaxes(1, 2)  # VSMM 6.3d
         rest = np.eye(jacobians.shape[2]) - gains @ jacobians
         # Joseph's form
-        kept = rest @ belief.covariances @ rest.swapaxes(1, 2)  # (r, e, e)
-        added = gains @ noise @ gains.swapaxes(1, 2)
-        after = kept + added
+        of_prediction = rest @ belief.covariances @ rest.swapaxes(1, 2)  # (r, e, e)
+        of_noise = gains @ noise @ gains.swapaxes(1, 2)
+        after = of_prediction + of_noise
         after = 0.5 * (after + after.swapaxes(1, 2))
         corrections = (gains @ residuals[..., None])[..., 0]  # (r, e)
         states = self.manifold.plus(belief.states, corrections)

@@ -127,12 +127,12 @@ def detect(
     # VSMM 2.3
     points[_TORSO] = expected[_TORSO] + points[AT["root"]] - expected[AT["root"]]
     confidence[_TORSO] = 1.0
-    found = _knees(lines, points, confidence, expected, gates, rules.crossings)
+    middles = _knees(lines, points, confidence, expected, gates, rules.crossings)
     for side in ("left", "right"):
         elbow = _elbow(lines, points, confidence, expected, side, gates)
         if elbow is not None:
-            found[f"{side} elbow"] = elbow
-    for name, point in found.items():
+            middles[f"{side} elbow"] = elbow
+    for name, point in middles.items():
         place(name, point)
         points[AT[name]] -= bias[AT[name]]
     return points, confidence, unassigned
@@ -221,7 +221,10 @@ def _elbow(
     side: str,
     gates: Array,
 ) -> Array | None:
-    """Return the point of the skeleton line as far from hand as shoulder, or None."""
+    """Return an elbow, or None if it is not detected.
+
+    It is a point of the skeleton line as far from the hand as from the shoulder.
+    """
     hand = AT[f"{side} hand"]
     elbow = AT[f"{side} elbow"]
     shoulder = AT[f"{side} shoulder"]
@@ -246,7 +249,7 @@ def _knees(
     gates: Array,
     crossings_of: Crossings,
 ) -> dict[str, Array]:
-    """Return the knees that are found, by name.
+    """Return the detected knees by name.
 
     They are where the skeleton line crosses a parallel to the line between the feet,
     through the middle of the legs.

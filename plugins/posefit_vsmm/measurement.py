@@ -54,7 +54,7 @@ class ExpectedPoints(NamedTuple):
 
     pixels: Array  # (17, 2)
     covariances: Array  # (17, 2, 2) square pixels
-    metre: float  # pixels per metre at the root's depth
+    pixels_per_metre: float  # at the root's depth
 
 
 def with_sides(landmarks: Array, expected: Array) -> tuple[Array, Array]:
@@ -85,23 +85,23 @@ def with_sides(landmarks: Array, expected: Array) -> tuple[Array, Array]:
 
 
 def with_landmarks(
-    found: JointMeasurement, landmarks: Array, seen: ExpectedPoints
+    detected: JointMeasurement, landmarks: Array, expected: ExpectedPoints
 ) -> JointMeasurement:
     """Return the means of the rules' points and of landmarks (27, 3).
 
     The weights are inverse variances.
     """
-    placed, trust = with_sides(landmarks, seen.pixels)
-    visible = found.confidence > 0.0
-    rules = visible[:, None] / found.variances
-    landmark_variance = (DEVIATION * seen.metre) ** 2
+    placed, trust = with_sides(landmarks, expected.pixels)
+    visible = detected.confidence > 0.0
+    rules = visible[:, None] / detected.variances
+    landmark_variance = (DEVIATION * expected.pixels_per_metre) ** 2
     total = rules + np.maximum(trust, 1e-12)[:, None] / landmark_variance
-    placed = np.where(trust[:, None] > 0.0, placed, found.points)
+    placed = np.where(trust[:, None] > 0.0, placed, detected.points)
     return JointMeasurement(
-        placed + rules / total * (found.points - placed),
-        np.maximum(found.confidence, trust),
+        placed + rules / total * (detected.points - placed),
+        np.maximum(detected.confidence, trust),
         1.0 / total,
-        found.unassigned,
+        detected.unassigned,
     )
 
 
@@ -160,41 +160,44 @@ class JointCameras:
         self,
         camera: Camera,
         lines: Lines | None,
-        expected: Array,
+        state: Array,
         spread: Array,
         landmarks: Array | None,
     ) -> JointMeasurement:
-        seen = self._expected_points(camera, expected, spread)
+        """Detect the joints in one camera's image, given the expected state (43,)."""
+        expected = self._expected_points(camera, state, spread)
         if lines is None:
-            hidden = np.zeros(len(seen.pixels))
-            return JointMeasurement(seen.pixels, hidden, np.ones_like(seen.pixels), 0)
-        found = self._found_by_rules(lines, seen)
+            pixels = expected.pixels
+            hidden = np.zeros(len(pixels))
+            return JointMeasurement(pixels, hidden, np.ones_like(pixels), 0)
+        detected = self._by_rules(lines, expected)
         if landmarks is not None and landmarks.any():
-            found = with_landmarks(found, landmarks, seen)
-        return self._gated(found, seen)
+            detected = with_landmarks(detected, landmarks, expected)
+        return self._gated(detected, expected)
 
     def _expected_points(
-        self, camera: Camera, expected: Array, spread: Array
+        self, camera: Camera, state: Array, spread: Array
     ) -> ExpectedPoints:
         """Return where a camera is expected to see the points of a state (43,)."""
-        all_pixels, jacobians = self.project(camera, expected[None])
+        all_pixels, jacobians = self.project(camera, state[None])
         pixels = all_pixels[0]
         jacobian = jacobians[0]
-        depth = float((camera.rotation @ expected[:3] + camera.translation)[2])
-        metre = float(camera.focal.mean()) / max(depth, MIN_DEPTH)
+        depth = float((camera.rotation @ state[:3] + camera.translation)[2])
+        pixels_per_metre = float(camera.focal.mean()) / max(depth, MIN_DEPTH)
         covariances = jacobian @ spread @ jacobian.swapaxes(1, 2)
-        return ExpectedPoints(pixels, covariances, metre)
+        return ExpectedPoints(pixels, covariances, pixels_per_metre)
 
-    def _found_by_rules(self, lines: Lines, seen: ExpectedPoints) -> JointMeasurement:
-        """Return the joints that the rules find in a silhouette. VSMM 2."""
-        leg = leg_of(self.body.skeleton) * seen.metre
-        head = head_radius(self.body) * seen.metre
+    def _by_rules(self, lines: Lines, expected: ExpectedPoints) -> JointMeasurement:
+        """Return the joints that the rules detect in a silhouette. VSMM 2."""
+        leg = leg_of(self.body.skeleton) * expected.pixels_per_metre
+        head = head_radius(self.body) * expected.pixels_per_metre
         # each point is searched for within a gate around its expected position
-        largest = np.diagonal(seen.covariances, axis1=1, axis2=2).max(axis=1)  # (17,)
+        variances_of_points = np.diagonal(expected.covariances, axis1=1, axis2=2)
+        largest = variances_of_points.max(axis=1)  # (17,)
         low, high = self.rules.gate
         gates = np.clip(GATE_DEVIATIONS * np.sqrt(largest), low * leg, high * leg)
         points, confidence, unassigned = detect(
-            lines, seen.pixels, gates, leg, head, self.rules
+            lines, expected.pixels, gates, leg, head, self.rules
         )
         variances = self.joint_noise * (self.rules.deviation * leg) ** 2
         # Interpretation V8
@@ -203,20 +206,22 @@ class JointCameras:
             points, confidence, variances / trusted[:, None], unassigned
         )
 
-    def _gated(self, found: JointMeasurement, seen: ExpectedPoints) -> JointMeasurement:
-        """Return the joints with those hidden that are too far from where expected.
+    def _gated(
+        self, detected: JointMeasurement, expected: ExpectedPoints
+    ) -> JointMeasurement:
+        """Return the joints, with those too far from their expected points hidden.
 
-        The distance is Mahalanobis', squared. Such joints count as unassigned.
+        The squared Mahalanobis distance decides. Rejected joints count as unassigned.
         """
-        residuals = found.points - seen.pixels
-        innovations = seen.covariances + found.variances[:, :, None] * np.eye(2)
+        residuals = detected.points - expected.pixels
+        innovations = expected.covariances + detected.variances[:, :, None] * np.eye(2)
         solved = np.linalg.solve(innovations, residuals[..., None])[..., 0]  # (17, 2)
         distances = (residuals * solved).sum(axis=1)
-        visible = found.confidence > 0.0
+        visible = detected.confidence > 0.0
         rejected = (distances >= self.rules.max_distance) & visible
-        return found._replace(
-            confidence=np.where(rejected, 0.0, found.confidence),
-            unassigned=found.unassigned + int(np.count_nonzero(rejected)),
+        return detected._replace(
+            confidence=np.where(rejected, 0.0, detected.confidence),
+            unassigned=detected.unassigned + int(np.count_nonzero(rejected)),
         )
 
     def measure(
@@ -224,7 +229,8 @@ class JointCameras:
     ) -> Measurement:
         """Return the measurement of states (r, 43).
 
-        It has the residuals of the detected joints and of a known translation (3,). V9.
+        It has the residuals of the detected joints and of a known translation (3,).
+        Interpretation V9.
         """
         count = len(states)
         residuals = []

@@ -208,7 +208,7 @@ class PatentForm:
     def cycle_over_both(self, union: Union, before: Belief, measure: Measure) -> Belief:
         """Return the belief after a cycle over both groups, the new one's first."""
         both = self.joined(union, before)
-        return self.begun(union).cycle(both, measure)
+        return self.first_filter(union).cycle(both, measure)
 
     def joined(self, union: Union, belief: Belief) -> Belief:
         """Return a belief over the models of both groups. VSMM 8."""
@@ -221,8 +221,11 @@ class PatentForm:
                 new[name] = pose, lifted(pose[None], noise)[0], top
         return normalised(regrouped(belief, union.old_names, union.names, new))
 
-    def begun(self, union: Union) -> IMM:
-        """Return a filter that predicts new models with their noise as covariance."""
+    def first_filter(self, union: Union) -> IMM:
+        """Return the filter of a union's first cycle.
+
+        It predicts the new models with their noise as covariance.
+        """
         rows = [k for k, name in enumerate(union.names) if name not in union.old_names]
         noises = union.models.noises
 

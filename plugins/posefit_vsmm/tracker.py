@@ -13,6 +13,7 @@ from posefit.fitting.check import choices, positive
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.skeleton import ANGLES
 from posefit.silhouette.cost import known_views, pose_costs
+from posefit.silhouette.mask import Areas
 from posefit_vsmm.first_state import FirstState
 from posefit_vsmm.groups import TOPOLOGY, most_probable
 from posefit_vsmm.imm import Belief, Measurement
@@ -85,7 +86,7 @@ class MissingLimbs:
         bones = extra[FIRST_BONE:].reshape(-1, 3)  # a view: writing to it fills `extra`
         unassigned = any(view.unassigned for view in measured)
         for limb, frames in self._frames.items():
-            if unassigned and not _detected(limb, measured):
+            if unassigned and not _is_detected(limb, measured):
                 self._frames[limb] = frames + 1
             else:
                 self._frames[limb] = 0
@@ -97,7 +98,7 @@ class MissingLimbs:
         return np.asarray(extra * self._scales**2)
 
 
-def _detected(point: str, measured: Sequence[JointMeasurement]) -> bool:
+def _is_detected(point: str, measured: Sequence[JointMeasurement]) -> bool:
     """Return whether some camera detected a point."""
     row = AT[point]
     return any(view.confidence[row] > 0.0 for view in measured)
@@ -149,7 +150,7 @@ class TrackFilter:
         views: list[Lines | None] = [None] * len(observation.silhouettes)
         if observation.usable:
             views = [lines_of(view.mask) for view in observation.silhouettes]
-        blind = all(lines is None for lines in views)
+        blind = all(lines is None for lines in views)  # the person is hidden
         if blind:
             self._blind_frames += 1
         else:
@@ -160,7 +161,7 @@ class TrackFilter:
             if blind:
                 return self._repeated(observation)
             self._belief = self._start(observation)
-        belief, measured, details = self._detected(self._belief, views, observation)
+        belief, measured, details = self._detect(self._belief, views, observation)
         details["detection_seconds"] = time.perf_counter() - start
 
         def measure(states: Array) -> Measurement:
@@ -191,7 +192,7 @@ class TrackFilter:
             place = self._task.anchor
         return self._frame(pose, place, observation, {})
 
-    def _detected(
+    def _detect(
         self, belief: Belief, views: Sequence[Lines | None], observation: Observation
     ) -> tuple[Belief, list[JointMeasurement], dict[str, Any]]:
         """Detect the joints of a frame.
@@ -248,8 +249,6 @@ class TrackFilter:
     ) -> Frame:
         """Return a frame with its cost, its activity, and the models in its details."""
         task = self._task
-        belief = self._belief
-        switching = self.switching
         if observation.translation is not None:
             place = observation.translation
         pose = np.where(task.body.skeleton.free, pose, 0.0)
@@ -257,13 +256,40 @@ class TrackFilter:
         costs, counts = pose_costs(
             task.body, task.cameras, observation.silhouettes, pose[None], place[None]
         )
-        if not self._blind_frames:
-            known = known_views(list(counts[:, 0]), observation.silhouettes)
-            iou = metrics.iou(np.array(known)).mean()
-            if iou < LOST_IOU:
-                self._bad_frames += 1
-            else:
-                self._bad_frames = 0
+        areas = counts[:, 0]  # (V, 3)
+        self._count_bad_frame(areas, observation)
+        activity, models = self._active_models()
+        cost = float(costs[0])
+        self._latest = Frame(
+            pose=pose,
+            translation=place,
+            cost=cost,
+            areas=areas,
+            evaluations=self._evaluations,
+            trace=np.array([[self._evaluations, cost]]),
+            activity=activity,
+            details={**details, **models},
+        )
+        return self._latest
+
+    def _count_bad_frame(self, areas: Areas, observation: Observation) -> None:
+        """Count successive frames whose pose does not fit; hidden ones change nothing.
+
+        `areas` (V, 3) are those of the frame's pose.
+        """
+        if self._blind_frames:
+            return
+        known = known_views(list(areas), observation.silhouettes)
+        iou = metrics.iou(np.array(known)).mean()
+        if iou < LOST_IOU:
+            self._bad_frames += 1
+        else:
+            self._bad_frames = 0
+
+    def _active_models(self) -> tuple[str | None, dict[str, Any]]:
+        """Return the activity, None if lost, and the models as details of a frame."""
+        belief = self._belief
+        switching = self.switching
         models: dict[str, Any] = {
             "group": switching.group,
             "candidate_group": switching.candidate_group,
@@ -271,24 +297,13 @@ class TrackFilter:
             "lost": belief is None,
             "models": switching.active,
         }
-        activity = None
-        if belief is not None:
-            models["probabilities"] = belief.probabilities
-            activity = most_probable(
-                switching.topology.activities, switching.active, belief.probabilities
-            )
-        cost = float(costs[0])
-        self._latest = Frame(
-            pose=pose,
-            translation=place,
-            cost=cost,
-            areas=counts[:, 0],
-            evaluations=self._evaluations,
-            trace=np.array([[self._evaluations, cost]]),
-            activity=activity,
-            details={**details, **models},
+        if belief is None:
+            return None, models
+        models["probabilities"] = belief.probabilities
+        activity = most_probable(
+            switching.topology.activities, switching.active, belief.probabilities
         )
-        return self._latest
+        return activity, models
 
 
 @dataclass(eq=False)
