@@ -508,7 +508,7 @@ def test_a_new_models_prediction_has_its_noise_as_covariance_to_the_letter() -> 
     union = switching.union_with("G3")
     both = PatentForm().joined(union, belief)
     states, covariances = (
-        PatentForm().begun(union).predict(both.states, both.covariances)
+        PatentForm().first_filter(union).predict(both.states, both.covariances)
     )
     _, usual = union.filter.predict(both.states, both.covariances)
     noises = switching.models.of(union.names).noises
