@@ -178,16 +178,16 @@ class Ledger:
         name = quoted(key[:8])[1:-1]
         having = [file.path for file in self._files if file.counts(key)]
         path, *_ = having or [self._files[0].path]
-        problem = (
-            f"{path}: the row of cell {name} must be written by posefit: "
-            f"{cut(text_of(error))}"
-        )
+        reason = cut(text_of(error))
         # a key of somebody else's ledger could hold a command of the shell
         if not KEY.fullmatch(key):
-            return InputError(f"{problem}; its key is not one of posefit's either")
+            return InputError(
+                f"{path}: the row and the key of cell {name} must be written by "
+                f"posefit: {reason}"
+            )
         statement = f"UPDATE cells SET status = 'planned' WHERE key LIKE '{name}%'"
         return InputError(
-            f"{problem}; "
+            f"{path}: the row of cell {name} must be written by posefit: {reason}; "
             f'to run it again: sqlite3 {shlex.quote(str(path))} "{statement}"'
         )
 

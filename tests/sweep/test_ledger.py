@@ -142,7 +142,7 @@ def test_a_command_for_the_shell_holds_no_key_that_posefit_did_not_make(
 ) -> None:
     folder = filled(tmp_path / "results", 1)
     changed(folder, "UPDATE cells SET key = '`reboot`', row = '2'")
-    with pytest.raises(ValueError, match="its key is not one of posefit's") as caught:
+    with pytest.raises(ValueError, match="the row and the key of cell") as caught:
         rows_in(folder)
     assert "UPDATE" not in str(caught.value)
 
