@@ -17,7 +17,7 @@ from posefit.statistics.profiles import Trace, performance_profile
 from posefit.uncertainty.calibration import LEVELS
 
 POINTS = 41  # of a curve
-PROFILE = 200  # points of a performance profile
+PROFILE_POINTS = 200  # points of a performance profile
 # the levels of intervals in percent, as they are named in rows
 LEVEL_NAMES = tuple(f"{100 * level:.0f}" for level in LEVELS)
 
@@ -82,7 +82,7 @@ def track_charts(contest: Contest) -> list[Chart]:
         )
         charts.append(convergence_chart)
     errors = contest.scores
-    levels = np.linspace(0.0, float(errors.max()), PROFILE)
+    levels = np.linspace(0.0, float(errors.max()), PROFILE_POINTS)
     shares = performance_profile(errors[:, :, None], levels)
     profile_chart = Chart(
         name="profile",

@@ -73,7 +73,7 @@ def _index(name: str, file: str, group: Sequence[SuiteRun]) -> str:
     ends = []
     for run in group:
         used = int(run.evaluations[-1])
-        ends.append(f"{run.instance}:{used}|{_above(run, run.cost):.1e}")
+        ends.append(f"{run.instance}:{used}|{_above_truth(run, run.cost):.1e}")
     return (
         f"suite = '{first.suite}', funcId = {first.function}, DIM = {first.dimension}, "
         f"Precision = {TARGETS[-1]:.3e}, algId = '{name}', coco_version = '2.8', "
@@ -87,10 +87,10 @@ def _rows(run: SuiteRun) -> str:
     """Return the rows of a run: function evaluations, 0 of constraints, best cost."""
     lines = ["% f evaluations | g evaluations | best cost above the true pose's\n"]
     for used, cost in zip(run.evaluations, run.costs, strict=True):
-        lines.append(f"{int(used)} 0 {_above(run, cost):+.9e}\n")
+        lines.append(f"{int(used)} 0 {_above_truth(run, cost):+.9e}\n")
     return "".join(lines)
 
 
-def _above(run: SuiteRun, cost: float) -> float:
+def _above_truth(run: SuiteRun, cost: float) -> float:
     # a search of function 8 may find a lower cost than the true pose's
     return max(float(cost) - run.truth_cost, 0.0)

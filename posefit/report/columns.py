@@ -11,8 +11,8 @@ from posefit.arrays import Array
 from posefit.evaluation.measures import Measure
 from posefit.reading import counted
 
-LEAST_P = 0.001  # texts only say that a p is lower
-NAMED = 4  # the most names that a sentence lists; of others it gives the number
+MIN_P = 0.001  # texts only say that a p is lower
+MAX_NAMES = 4  # in a sentence, which counts the others
 _SYMBOLS = {"degrees": "°"}  # short forms of units, for titles of columns
 
 
@@ -151,10 +151,10 @@ class Score:
 
 def p_text(p: float) -> str:
     """Return the text of a p, such as `p = 0.034` or `p < 0.001`."""
-    return f"p < {LEAST_P}" if p < LEAST_P else f"p = {p:.2g}"
+    return f"p < {MIN_P}" if p < MIN_P else f"p = {p:.2g}"
 
 
-def listed(values: Sequence[Any], most: int = NAMED) -> str:
+def listed(values: Sequence[Any], most: int = MAX_NAMES) -> str:
     """Return values as a list in a sentence, such as `a, b and 3 others`.
 
     Semicolons separate values that contain commas.

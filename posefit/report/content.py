@@ -8,7 +8,7 @@ from typing import Any
 
 from posefit.errors import printable
 from posefit.reading import counted
-from posefit.report.columns import LEAST_P
+from posefit.report.columns import MIN_P
 from posefit.report.contest import Contest, Runs
 from posefit.report.leaderboard import Standings
 from posefit.report.page import COLOUR_COUNT
@@ -18,7 +18,7 @@ from posefit.sweep.ledger import Ledger
 
 # How many the first screen names: the most frequent failures and warnings, and the
 # instances that are not compared.
-REASONS = 5
+MAX_DETAILS = 5
 MAX_MISSING = 20
 MAX_BLOCKS = 1_000_000  # tables only say that more are needed
 
@@ -58,7 +58,7 @@ def data_of(ledger: Ledger, runs: Runs, standings: Standings | None) -> dict[str
             "colours": COLOUR_COUNT,
             "significance": SIGNIFICANCE,
             "power": POWER,
-            "least_p": LEAST_P,
+            "least_p": MIN_P,
             "max_blocks": MAX_BLOCKS,
         },
         "columns": {name: kind.columns[name].as_dict() for name in runs.table_figures},
@@ -176,7 +176,9 @@ def _left_out(runs: Runs, contest: Contest) -> Iterator[Problem]:
         yield _problem(text, details, MAX_MISSING)
 
 
-def _problem(text: str, details: Sequence[str] = (), most: int = REASONS) -> Problem:
+def _problem(
+    text: str, details: Sequence[str] = (), most: int = MAX_DETAILS
+) -> Problem:
     """Return a problem with at most `most` of its details."""
     named = list(details[:most])
     if len(details) > most:

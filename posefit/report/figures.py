@@ -25,7 +25,10 @@ MARKERS = ("o", "s", "^", "D", "v", "X", "*", "h")
 TABLE = "leaderboard.csv"
 TABLE_MARK = b"method,settings,"
 CHARTS = ("leaderboard", "convergence", "profile")
-NAMES = (*(f"{chart}.{kind}" for chart in CHARTS for kind in ("png", "pdf")), TABLE)
+FOLDER_FILES = (
+    *(f"{chart}.{kind}" for chart in CHARTS for kind in ("png", "pdf")),
+    TABLE,
+)
 WIDTH = 6.4  # inches
 
 
@@ -61,7 +64,6 @@ def chart_figure(
         line = chart.lines[k]
         if line is None:
             continue
-        # from the eighth method on, colours repeat with another line style
         colour = COLOURS[numbers[k] % len(COLOURS)]
         # steps, because a best cost holds until the next improvement
         axes.plot(
@@ -158,7 +160,7 @@ def check_folder(path: str | Path) -> None:
     is_earlier = (
         folder.is_dir()
         and not folder.is_symlink()
-        and not other_entries(folder, NAMES)
+        and not other_entries(folder, FOLDER_FILES)
         and table.is_file()
         and table.read_bytes().startswith(TABLE_MARK)
     )
@@ -200,9 +202,9 @@ def write_figures(standings: Standings, path: str | Path) -> None:
                 for kind in ("png", "pdf"):
                     save(figure, unfinished.path / f"{name}.{kind}")
             write_csv(board_rows(standings), unfinished.path / TABLE)
-            unfinished.finish(NAMES, replace=True)
+            unfinished.finish(FOLDER_FILES, replace=True)
         except BaseException:
-            unfinished.remove(NAMES)
+            unfinished.remove(FOLDER_FILES)
             raise
     except OSError as error:
         raise InputError(

@@ -272,9 +272,9 @@ def _labels(rows: _Rows, latest: bool) -> dict[int, str]:
 
     def order(m: int) -> tuple[bool, float, str]:
         """Return a key that is lower for better methods."""
-        own = badness[method == m]
-        mean = float(own.mean()) if len(own) else 0.0
-        return not len(own), mean, json_of(variants[m])
+        of_method = badness[method == m]
+        mean = float(of_method.mean()) if len(of_method) else 0.0
+        return not len(of_method), mean, json_of(variants[m])
 
     best_first = sorted(
         _latest(variants) if latest else range(len(variants)), key=order

@@ -38,9 +38,9 @@ def leader_sentences(standings: Standings) -> list[str]:
     worse = [pair for pair in shown if pair[1].difference > 0.0]
     better = [pair for pair in shown if pair[1].difference <= 0.0]
     where = f"{kind.instance_words(contest)} with {contest.seed_words}"
-    facts = f"{_value(contest, first)} on {where}"
+    facts = f"{_losses_and_score(contest, first)} on {where}"
     if worse:
-        text = f"{first.name} {facts}; it leads {_led(contest, worse)}."
+        text = f"{first.name} {facts}; it leads {_worse_methods(contest, worse)}."
     elif tested:
         text = f"No method leads; {first.name}, which comes first, {facts}."
     else:
@@ -52,7 +52,7 @@ def leader_sentences(standings: Standings) -> list[str]:
     if unclear:
         effects = listed([_effect(contest, *pair) for pair in unclear])
         sentences.append(f"No difference is shown from {effects}.")
-        sentences += _power(contest, unclear)
+        sentences += _needed_blocks(contest, unclear)
     if not others:
         sentences.append("No other method shares its runs.")
     elif not tested:
@@ -62,7 +62,7 @@ def leader_sentences(standings: Standings) -> list[str]:
     return [*map(printable, sentences)]
 
 
-def _value(contest: Contest, row: Standing) -> str:
+def _losses_and_score(contest: Contest, row: Standing) -> str:
     """Return the end of a sentence: a method's losses, and its score with interval."""
     score = contest.runs.kind.score
     mean = row.figures[score.name]
@@ -77,7 +77,7 @@ def _value(contest: Contest, row: Standing) -> str:
     return f"lost frames in {lost} of {counted(row.runs, 'track')} and {value}"
 
 
-def _led(contest: Contest, worse: Sequence[Tested]) -> str:
+def _worse_methods(contest: Contest, worse: Sequence[Tested]) -> str:
     """Return the methods that are shown to be worse; the nearest has its difference."""
     score = contest.runs.kind.score
     (nearest, test), *more = sorted(worse, key=lambda pair: pair[1].difference)
@@ -116,7 +116,7 @@ def _is_zero(test: PairedTest) -> bool:
     return test.low == test.high == 0.0
 
 
-def _power(contest: Contest, unclear: Sequence[Tested]) -> list[str]:
+def _needed_blocks(contest: Contest, unclear: Sequence[Tested]) -> list[str]:
     """Return a sentence about how many runs would show the differences.
 
     There is none about methods that are equal in all runs.

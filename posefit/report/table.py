@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from posefit.report.columns import LEAST_P, Score
+from posefit.report.columns import MIN_P, Score
 from posefit.report.leaderboard import EFFECT, Standing, Standings
 from posefit.report.tracks import LOSS_BASELINE
 
@@ -35,8 +35,8 @@ def board_cells(score: Score, row: Standing) -> dict[str, str]:
     if row.test:
         behind = number(row.test.difference)
         p = number(row.test.adjusted, 3)
-        if row.test.adjusted < LEAST_P:
-            p = f"< {LEAST_P}"
+        if row.test.adjusted < MIN_P:
+            p = f"< {MIN_P}"
     cells = {
         score.column.title: number(row.figures[score.name]),
         "95 % interval": ends,
@@ -85,6 +85,7 @@ def board_rows(standings: Standings) -> list[dict[str, Any]]:
 
     They have every figure under its name, and all else that the page has of a method.
     """
+    # of both kinds of runs the first figure is the score
     score, *others = standings.contest.runs.table_figures
     names = ["settings", score, "low", "high", *EFFECT]
     if standings.board[0].lost_tracks is not None:

@@ -18,7 +18,7 @@ from posefit.fitting.metrics import skill
 from posefit.measuring.centres import PLACES
 from posefit.reading import counted
 from posefit.report import charts
-from posefit.report.columns import NAMED, Column, Score, listed
+from posefit.report.columns import MAX_NAMES, Column, Score, listed
 from posefit.report.contest import Baseline, Contest, Indices, InstanceFields, Row, Runs
 from posefit.report.stored import Packed, Store, Traces
 from posefit.sweep.repeat import END, TRACK_BEGIN, plan_lines, track_fields
@@ -64,32 +64,35 @@ def _share(name: str) -> Measure:
     return replace(MEASURES[name], digits=MEASURES[name].digits + 1)
 
 
-def _columns() -> list[Column]:
-    """Return the figures of a track."""
-    loss = Measure(
-        LOSS,
-        "error with losses",
-        "degrees",
-        2,
-        "the error, in which a lost frame counts at least as much as the mean "
-        "training pose",
-    )
-    skills = []
-    baselines = []
+def _skill_columns() -> list[Column]:
+    """Return the skills over each baseline."""
+    measure = MEASURES["skill"]
+    columns = []
     for name, label in BASELINES.items():
-        measure = MEASURES["skill"]
         skill_measure = replace(
             measure,
             name=f"skill.{name}",
             label=f"{measure.label}: {label}",
             meaning=f"{measure.meaning}; compared with the {label}",
         )
-        skills.append(Column(skill_measure, higher_is_better=True))
-        baseline_measure = replace(
+        columns.append(Column(skill_measure, higher_is_better=True))
+    return columns
+
+
+def _baseline_columns() -> list[Column]:
+    """Return the errors of the baselines."""
+    columns = []
+    for name, label in BASELINES.items():
+        measure = replace(
             MEASURES["baselines_degrees"], name=f"baselines_degrees.{name}", label=label
         )
-        baselines.append(Column(baseline_measure, in_tables=False))
-    intervals = []
+        columns.append(Column(measure, in_tables=False))
+    return columns
+
+
+def _interval_columns() -> list[Column]:
+    """Return how often the intervals of each level hold the truth, and their widths."""
+    columns = []
     for level in charts.LEVEL_NAMES:
         shown = level == TABLE_LEVEL
         coverage = replace(
@@ -102,26 +105,39 @@ def _columns() -> list[Column]:
             name=f"interval_mm.{level}",
             label=f"{level} % interval",
         )
-        intervals += [
+        columns += [
             Column(coverage, higher_is_better=True, in_tables=shown, optional=True),
             Column(width, in_tables=shown, optional=True),
         ]
+    return columns
+
+
+def _columns() -> list[Column]:
+    """Return the figures of a track."""
+    loss = Measure(
+        LOSS,
+        "error with losses",
+        "degrees",
+        2,
+        "the error, in which a lost frame counts at least as much as the mean "
+        "training pose",
+    )
     error = replace(MEASURES["error_degrees"], name="error_degrees.mean")
     return [
         Column(loss, brief=True),
         # only in rows and the CSV: a page with 100,000 rows has no room for it
         Column(error, in_tables=False),
-        *skills,
+        *_skill_columns(),
         Column(_share("lost_rate"), brief=True),
         Column(_share("swap_rate")),
         Column(_share("unknown_rate"), optional=True),
-        *intervals,
+        *_interval_columns(),
         Column(MEASURES["mpjpe_mm"]),
         Column(MEASURES["iou"], higher_is_better=True),
         Column(MEASURES["seconds_per_frame"], brief=True),
         Column(MEASURES["cpu_seconds_per_frame"]),
         Column(replace(MEASURES["evaluations"], name="evaluations_used")),
-        *baselines,
+        *_baseline_columns(),
     ]
 
 
@@ -259,7 +275,9 @@ class Tracks:
     def instance_words(self, contest: Contest) -> str:
         """Return the instances of a contest in words: `4 instances of run and walk`."""
         motions = sorted(set(contest.instance_field("motion").tolist()))
-        names = listed(motions) if len(motions) <= NAMED else f"{len(motions)} motions"
+        names = (
+            listed(motions) if len(motions) <= MAX_NAMES else f"{len(motions)} motions"
+        )
         return f"{counted(len(contest.instances), 'instance')} of {names}"
 
     def baseline_sentences(
@@ -270,11 +288,11 @@ class Tracks:
         for baseline in baselines:
             if (error := baseline.figures[LOSS]) is not None:
                 known.append((error, baseline.title))
-        own = contest.runs.averages(contest.rows_of(first))[LOSS]
-        if not known or own is None:
+        first_error = contest.runs.averages(contest.rows_of(first))[LOSS]
+        if not known or first_error is None:
             return []
         error, title = min(known, key=itemgetter(0))
-        if error > own:
+        if error > first_error:
             return [f"The best baseline, the {title}, has {SCORE.text(error)}."]
         return [f"It does not beat the baselines: the {title} has {SCORE.text(error)}."]
 

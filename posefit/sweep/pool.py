@@ -54,9 +54,9 @@ class Pool:
             if not worker.is_alive:
                 self._end(worker)
                 idle.remove(worker)
-        mine = [worker for worker in idle if worker.tenant == tenant]
-        if mine:
-            worker = mine[-1]
+        of_tenant = [worker for worker in idle if worker.tenant == tenant]
+        if of_tenant:
+            worker = of_tenant[-1]
             self._workers.remove(worker)
         else:
             if idle and len(self._workers) >= self._count + SPARE:

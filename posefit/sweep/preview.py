@@ -21,7 +21,7 @@ from posefit.sweep.pool import Pool
 from posefit.sweep.shard import cells_of, done_in, file_of, ledgers_of
 from posefit.sweep.versions import foreign_plugins
 
-VALUES = 12  # the most values of a field that a preview lists
+MAX_VALUES = 12  # the most values of a field that a preview lists
 FRAMES = 4  # of the short run of a method
 
 
@@ -104,10 +104,10 @@ def _value_lines(counts: Mapping[str, Counter[str]]) -> list[str]:
         if name not in ("method", "motion") and not is_varied:
             continue
         shown = []
-        for value, count in islice(values.items(), VALUES):
+        for value, count in islice(values.items(), MAX_VALUES):
             shown.append(f"{count:,} x {cut(value)}")
-        if len(values) > VALUES:
-            shown.append(f"and {len(values) - VALUES:,} other values")
+        if len(values) > MAX_VALUES:
+            shown.append(f"and {len(values) - MAX_VALUES:,} other values")
         lines.append(f"{name:16}  {', '.join(shown)}")
     return lines
 

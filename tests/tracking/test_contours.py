@@ -11,6 +11,7 @@ from posefit.arrays import Array
 from posefit.fitting import contour_kernels as kernels
 from posefit.fitting.contours import (
     MaskContours,
+    coarseness,
     contour_squares,
     distances_outside,
     precisions,
@@ -143,13 +144,13 @@ def pulled(numbers: Array, mask: kernels.Contour, scale: float) -> tuple[Array, 
 
 
 def pull_of_view(
-    view: MaskContours, k: int, here: Array, there: Array, reach: float
+    view: MaskContours, k: int, place: Array, here: Array, there: Array, reach: float
 ) -> tuple[Array, Array]:
     """Return half the second derivatives (n, n) and half the gradient (n,) by n parameters, in frame k.
 
-    The drawn body's numbers are `here` (106,), and `there` (n, 106) where each parameter is off by `STEP`.
+    The root is at `place` (3,). The drawn body's numbers are `here` (106,), and `there` (n, 106) where each parameter is off by `STEP`.
     """
-    root = view.metres[k]
+    root = coarseness(view.camera, place[None])[0][0]  # pixels per metre
     points = np.ascontiguousarray(view.points[view.starts[k] : view.starts[k + 1]])
     mask = kernels.Contour(
         view.fields[k],
@@ -230,7 +231,9 @@ def test_the_border_of_a_mask_is_where_it_meets_known_background() -> None:
     assert borders.starts.tolist() == [0, 60, 60]
     assert borders.points.min(axis=0).tolist() == [20.0, 20.0]
     assert borders.points.max(axis=0).tolist() == [39.5, 40.0]
-    assert borders.metres == pytest.approx([camera.focal[0] / 4.0] * 2)
+    per_metre, factor = coarseness(camera, np.zeros((2, 3)))
+    assert per_metre == pytest.approx([camera.focal[0] / 4.0] * 2)
+    assert factor == 1
 
 
 def test_the_border_terms_of_a_window_equal_those_of_a_slow_twin() -> None:
@@ -268,7 +271,9 @@ def test_the_border_terms_of_a_window_equal_those_of_a_slow_twin() -> None:
                 [there, [drawn_body(one, view.camera, points) for one, points in each]]
             )
             for whole, part in zip(
-                expected, pull_of_view(view, k, here, there, 0.09), strict=True
+                expected,
+                pull_of_view(view, k, places[k], here, there, 0.09),
+                strict=True,
             ):
                 whole[k] += part
     free = np.append([True] * 3, skeleton.free)
@@ -611,7 +616,7 @@ def test_fits_share_the_borders_of_a_window(monkeypatch: pytest.MonkeyPatch) -> 
     assert traced == [len(motion)]
     alone = original(camera, 0, observations[4:10], places)
     assert len(part) == len(alone) == 6
-    for name in ("metres", "corners", "sizes", "points", "starts"):
+    for name in ("corners", "sizes", "points", "starts"):
         np.testing.assert_array_equal(getattr(part, name), getattr(alone, name))
     for k, (rows, columns) in enumerate(alone.sizes.tolist()):
         box = np.s_[k, :rows, :columns]
