@@ -213,5 +213,10 @@ def write_figures(standings: Standings, path: str | Path) -> None:
 
 
 def _plain(name: str) -> str:
-    """Return a name in which matplotlib does not read `$` as the start of a formula."""
-    return name.replace("$", r"\$")
+    """Return a name that matplotlib shows as it is.
+
+    It reads `$` as the start of a formula, and leaves a line whose name begins with an
+    underscore, such as a private factory's, out of the legend.
+    """
+    plain = name.replace("$", r"\$")
+    return f" {plain}" if plain.startswith("_") else plain

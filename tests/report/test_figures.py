@@ -54,6 +54,14 @@ def test_a_method_has_the_colour_of_the_page_and_the_legend_the_leaderboards_ord
     ]
 
 
+def test_a_name_that_begins_with_an_underscore_is_in_the_legend():
+    chart = Chart(
+        name="a", title="A", x_label="x", y_label="y", lines=[Line(GRID, GRID)]
+    )
+    figure = figures.chart_figure(["_search"], chart, [0], [0])
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [" _search"]
+
+
 def test_the_leaderboard_is_a_picture_with_its_rows_from_top_to_bottom(tmp_path):
     contest = contest_of_errors(tmp_path, full({"a": 1.0, "b": 2.0}, instances=4))
     made = standings(contest)
