@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -298,6 +299,34 @@ class Camera:
             raise InputError(f"{path}: {error}") from None
 
 
+class StackedCameras(NamedTuple):
+    """The arrays of several cameras (c), as compiled code takes them."""
+
+    rotations: Array  # (c, 3, 3)
+    translations: Array  # (c, 3)
+    focals: Array  # (c, 2)
+    centres: Array  # (c, 2)
+
+
+def stacked(cameras: Sequence[Camera]) -> StackedCameras:
+    """Return the arrays of several cameras."""
+    rotations = []
+    translations = []
+    focals = []
+    centres = []
+    for camera in cameras:
+        rotations.append(camera.rotation)
+        translations.append(camera.translation)
+        focals.append(camera.focal)
+        centres.append(camera.centre)
+    return StackedCameras(
+        np.array(rotations),
+        np.array(translations),
+        np.array(focals),
+        np.array(centres),
+    )
+
+
 def is_focal(focal: Array, size: Sequence[float] | Array) -> bool:
     """Return whether a lens may have these focal lengths (2,) for some size."""
     shortest = FOCALS[0] * max(size)
@@ -308,7 +337,8 @@ def is_focal(focal: Array, size: Sequence[float] | Array) -> bool:
 def check_focal(focal: Array, size: Sequence[float] | Array) -> None:
     """Raise InputError if no lens has these focal lengths (2,) for a size."""
     if not is_focal(focal, size):
-        low, high = (share * max(size) for share in FOCALS)
+        low = FOCALS[0] * max(size)
+        high = FOCALS[1] * max(size)
         found = " and ".join(f"{length:g}" for length in focal)
         raise InputError(
             f"focal must be in pixels: {low:g} to {high:g} for pictures of this size, "

@@ -34,11 +34,15 @@ PI_LOW = 1.2246467991473532e-16
 _ANGLES = 66
 _BONES = 26
 _JOINTS = 27
-_ANGLE, _SINE, _COSINE = (kind * (_ANGLES + 3) * LANES for kind in range(3))
+_ANGLE = 0
+_SINE = _ANGLE + (_ANGLES + 3) * LANES
+_COSINE = _SINE + (_ANGLES + 3) * LANES
 _VIEW = _COSINE + (_ANGLES + 3) * LANES
 _OFFSETS = _VIEW + 12 * LANES
 _FRAMES = _OFFSETS + 3 * _BONES * LANES
-X, Y, Z = (_FRAMES + (12 + i) * _JOINTS * LANES for i in range(3))
+X = _FRAMES + 12 * _JOINTS * LANES
+Y = X + _JOINTS * LANES
+Z = Y + _JOINTS * LANES
 _END = Z + _JOINTS * LANES
 # with this mask an index is provably not negative, and numba omits the test for that
 NATURAL = 0x7FFFFFFF

@@ -30,16 +30,18 @@ LIMBS: Mapping[str, Sequence[str]] = {
     "right arm": ("rclavicle", "rhumerus", "rradius", "rwrist", "rhand"),
     "head": ("lowerneck", "upperneck", "head"),
 }
-_LEGS = (LIMBS["left leg"], LIMBS["right leg"])
-_ARMS = (LIMBS["left arm"], LIMBS["right arm"])
-_TORSO = ("lowerback", "upperback", "thorax", *LIMBS["head"])
+# the joint where each chain begins, and its bones, in the order of `JOINTS`
+_CHAINS = (
+    ("root", LIMBS["left leg"]),
+    ("root", LIMBS["right leg"]),
+    ("root", ("lowerback", "upperback", "thorax", *LIMBS["head"])),
+    ("thorax", LIMBS["left arm"]),
+    ("thorax", LIMBS["right arm"]),
+)
 _PARENT = {"root": "root"}  # the parent of each joint, parents before children
-for _start, *_chain in (
-    *(("root", *leg) for leg in _LEGS),
-    ("root", *_TORSO),
-    *(("thorax", *arm) for arm in _ARMS),
-):
-    _PARENT.update(zip(_chain, [_start, *_chain], strict=False))
+for _start, _chain in _CHAINS:
+    # a bone's parent is the bone before it in its chain
+    _PARENT.update(zip(_chain, (_start, *_chain), strict=False))
 
 JOINTS = tuple(_PARENT)  # 27 names, parents before children
 PARENTS = (-1, *map(JOINTS.index, [*_PARENT.values()][1:]))  # PARENTS[0] is -1
@@ -82,7 +84,7 @@ def both(kind: str) -> tuple[str, str]:
 # (27,) the joint on the other side of the body
 MIRROR = tuple(JOINTS.index(mirrored(name)) for name in JOINTS)
 # (27,) left, right or middle
-SIDES: tuple[Side, ...] = tuple(side(name) for name in JOINTS)
+SIDES: tuple[Side, ...] = tuple(map(side, JOINTS))
 
 
 def angle_index(joint: int) -> int:

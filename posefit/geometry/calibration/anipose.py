@@ -31,7 +31,7 @@ REQUIRED = {"matrix", "size", "distortions"}
 
 
 def _recognises(stored: Stored) -> bool:
-    return any(True for _ in _tables(stored.values))
+    return next(_tables(stored.values), None) is not None
 
 
 def _tables(

@@ -40,9 +40,16 @@ def _read(file: Stored) -> list[Calibration]:
             text = read_text(other, LARGEST_FILE)
             values = {**stored(other, text).values, **values}
     names = [str(name) for name in values.pop("names")]
-    known = {f"{kind}_{name}" for kind in KINDS for name in names}
+    known = set[str]()
+    for name in names:
+        for kind in KINDS:
+            known.add(f"{kind}_{name}")
     check_keys(values, known, path.stem, "EasyMocap")
-    return [_camera(name, values) for name in names if f"K_{name}" in values]
+    calibrations = list[Calibration]()
+    for name in names:
+        if f"K_{name}" in values:
+            calibrations.append(_camera(name, values))
+    return calibrations
 
 
 def _camera(name: str, values: Mapping[str, Any]) -> Calibration:

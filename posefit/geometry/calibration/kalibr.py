@@ -48,9 +48,10 @@ def _recognises(stored: Stored) -> bool:
 
 
 def _read(stored: Stored) -> list[Calibration]:
-    tables = {
-        name: table for name, table in stored.values.items() if isinstance(table, dict)
-    }
+    tables = dict[str, Mapping[str, Any]]()
+    for name, table in stored.values.items():
+        if isinstance(table, dict):
+            tables[name] = table
     calibrations = list[Calibration]()
     # a user added these, in a unit that Kalibr does not state
     if all({"rvec", "tvec"} <= table.keys() for table in tables.values()):

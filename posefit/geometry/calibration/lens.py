@@ -281,9 +281,9 @@ def stated(
 
 def _whole(size: Sequence[float]) -> tuple[int, int]:
     width, height = size
-    sides = float(width), float(height)
-    if not all(side.is_integer() and side >= 1 for side in sides):
-        raise InputError(f"an image size of {width} x {height}")
+    for side in (float(width), float(height)):
+        if not side.is_integer() or side < 1:
+            raise InputError(f"an image size of {width} x {height}")
     return int(width), int(height)
 
 

@@ -71,8 +71,11 @@ def _worlds(chunk: Any) -> Iterator[tuple[str | None, tuple[Array, Array, float]
     Each comes with the component's id, or None for the chunk itself. A transform is a
     rotation, a translation and a scale.
     """
-    holders = [(None, chunk)] if chunk.find("transform") is not None else []
-    holders += [(part.get("id"), part) for part in chunk.iter("component")]
+    holders = list[tuple[str | None, Any]]()
+    if chunk.find("transform") is not None:
+        holders.append((None, chunk))
+    for part in chunk.iter("component"):
+        holders.append((part.get("id"), part))
     for name, holder in holders:
         transform = holder.find("transform")
         if transform is None or transform.find("rotation") is None:

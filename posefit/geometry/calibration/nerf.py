@@ -29,6 +29,7 @@ from posefit.geometry.calibration.lens import (
 from posefit.geometry.calibration.values import (
     Stored,
     counts,
+    has_table,
     matrix_of,
     number_of,
     numbers_at,
@@ -69,16 +70,17 @@ FILE_KEYS = {
 
 def _recognises(stored: Stored) -> bool:
     frames = stored.values.get("frames")
-    return isinstance(frames, list) and any(
-        isinstance(frame, dict) and MATRIX in frame for frame in frames
-    )
+    return isinstance(frames, list) and has_table(frames, {MATRIX})
 
 
 def _read(stored: Stored) -> list[Calibration]:
     values = stored.values
     check_others(stored.path.stem, unread(values, FILE_KEYS))
     frames = values["frames"]
-    names = _names([str(frame.get("file_path", k)) for k, frame in enumerate(frames)])
+    paths = list[str]()
+    for number, frame in enumerate(frames):
+        paths.append(str(frame.get("file_path", number)))
+    names = _names(paths)
     shared = {key: value for key, value in values.items() if key in VIEW_KEYS}
     calibrations = list[Calibration]()
     for name, frame in zip(names, frames, strict=True):
@@ -154,7 +156,9 @@ def _matrix(values: Mapping[str, Any], size: Sequence[float] | None) -> Array:
     if not known:
         raise InputError("transforms without fl_x, camera_angle_x or K")
     # a file that states one focal length has square pixels
-    lengths = [known[0] if length is None else length for length in focal]
+    lengths = list[float]()
+    for length in focal:
+        lengths.append(known[0] if length is None else length)
     across = number_of(values.get("cx", 0.5 * size[0]))
     down = number_of(values.get("cy", 0.5 * size[1]))
     return pinhole_matrix(lengths, np.array([across - HALF, down - HALF]))

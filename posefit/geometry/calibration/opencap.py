@@ -7,7 +7,7 @@ with a message that says how to convert it.
 import numpy as np
 
 from posefit.geometry.calibration.dialect import Dialect
-from posefit.geometry.calibration.keys import check_others
+from posefit.geometry.calibration.keys import check_others, unread
 from posefit.geometry.calibration.lens import Calibration, Place, numbers_of, stated
 from posefit.geometry.calibration.values import Stored, matrix_of
 
@@ -29,18 +29,20 @@ KEYS = {
 def _read(stored: Stored) -> list[Calibration]:
     values = stored.values
     name = stored.path.stem
-    check_others(name, {key: value for key, value in values.items() if key not in KEYS})
+    check_others(name, unread(values, KEYS))
     matrix = numbers_of(matrix_of(values["intrinsicMat"]), (3, 3))
     size = np.ravel(matrix_of(values["imageSize"]))
     # The height comes first if the pictures are tall. The principal point shows which
     # side is which.
-    off = [np.abs(matrix[:2, 2] / sides - 0.5).max() for sides in (size, size[::-1])]
+    centre = matrix[:2, 2]
+    if np.abs(centre / size - 0.5).max() > np.abs(centre / size[::-1] - 0.5).max():
+        size = size[::-1]
     place: Place | None = None
     if "rotation" in values and "translation" in values:
         place = matrix_of(values["rotation"]), matrix_of(values["translation"])
     calibration = stated(
         name,
-        size if off[0] <= off[1] else size[::-1],
+        size,
         matrix,
         matrix_of(values.get("distortion", [0.0] * 5)),
         place,

@@ -11,7 +11,7 @@ neither the lens nor the place; see keys.py.
 """
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,8 @@ from posefit.geometry.calibration.lens import (
 from posefit.geometry.calibration.values import (
     Stored,
     counts,
+    first_of,
+    has_table,
     matrix_of,
     number_of,
     numbers_at,
@@ -118,16 +120,18 @@ def _read(stored: Stored) -> list[Calibration]:
             for key, value in table.items():
                 if not _is_camera(value):
                     known[plain(key)] = value
-            if _first(known, MATRIX) is not None or _pinhole(known) is not None:
+            if first_of(known, MATRIX) is not None or _pinhole(known) is not None:
                 cameras.append(_camera(name, table, known))
-            elif _first(known, (*LENS, *ROTATION, *SIZE, *SIDES[0][:1])) is not None:
+            elif first_of(known, (*LENS, *ROTATION, *SIZE, *SIDES[0][:1])) is not None:
                 keys = cut(", ".join(map(quoted, table)), KEYS_SHOWN)
                 raise InputError(
                     f"the keys {keys} of {quoted(name)}, but no camera matrix, and no "
                     "fx, fy, cx and cy"
                 )
             else:
-                around |= {k: v for k, v in table.items() if not _has_tables(v)}
+                for key, value in table.items():
+                    if not _has_tables(value):
+                        around[key] = value
                 inner += _tables(table)
         # aliases in YAML may repeat one table again and again
         if len(inner) > MOST_TABLES:
@@ -139,9 +143,7 @@ def _read(stored: Stored) -> list[Calibration]:
 
 
 def _has_tables(value: Any) -> bool:
-    return isinstance(value, dict) or (
-        isinstance(value, list) and any(isinstance(entry, dict) for entry in value)
-    )
+    return isinstance(value, dict) or (isinstance(value, list) and has_table(value))
 
 
 def _whole(table: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -192,18 +194,26 @@ def _camera(
     """Return the camera of a table; `known` has its values by their `plain` keys."""
     fisheye = _is_fisheye(known)
     numbered = NUMBERED_FISHEYE if fisheye else NUMBERED
-    lens = _first(known, LENS)
+    lens = first_of(known, LENS)
     read = {*LENS, *MODEL, *numbered, *SIZE, *SIDES[0], *SIDES[1], *ROTATION}
     read |= {*TRANSLATION, *FOCAL, *sum(CENTRES, ()), *sum(BOARDS, ())}
-    read.add(next((key for key in MATRIX if key in known), ""))
-    read |= {key for key in MODEL_TEXTS if _is_text(known.get(key))}
-    others = {key: value for key, value in values.items() if plain(key) not in read}
+    read.update(_model_keys(known))
+    for key in MATRIX:
+        if key in known:
+            # only the first was read: a second one may say something else
+            read.add(key)
+            break
+    others = dict[str, Any]()
+    for key, value in values.items():
+        if plain(key) not in read:
+            others[key] = value
     # the lens may be numbers with names, in the camera's table or in a separate one
     if lens is None or (isinstance(lens, dict) and "k1" in lens):
         for key, value in (lens or {}).items():
             if plain(key) not in {*numbered, *MODEL}:
                 others[key] = value
-        lens = [(known if lens is None else lens).get(key, 0.0) for key in numbered]
+        coefficients = known if lens is None else lens
+        lens = [coefficients.get(key, 0.0) for key in numbered]
     place = _place(known)
     check_others(name, others, placed=place is not None)
     return stated(
@@ -218,13 +228,14 @@ def _camera(
 
 def _size(known: Mapping[str, Any]) -> list[float] | None:
     """Return the width and the height, or None if the table does not state them."""
-    size = _first(known, SIZE)
+    size = first_of(known, SIZE)
     if isinstance(size, dict) and "data" not in size:
         known = {plain(key): value for key, value in size.items()}
         size = None
     if size is not None:
-        return [float(side) for side in np.ravel(matrix_of(size))]
-    sides = [_first(known, names) for names in SIDES]
+        stated_size: list[float] = np.ravel(matrix_of(size)).tolist()
+        return stated_size
+    sides = [first_of(known, names) for names in SIDES]
     return None if None in sides else [number_of(side) for side in sides]
 
 
@@ -234,7 +245,7 @@ def _is_text(value: Any) -> bool:
 
 
 def _matrix(known: Mapping[str, Any]) -> Array:
-    value = _first(known, MATRIX)
+    value = first_of(known, MATRIX)
     if value is None:
         return np.asarray(_pinhole(known))
     matrix = matrix_of(value)
@@ -243,8 +254,8 @@ def _matrix(known: Mapping[str, Any]) -> Array:
 
 def _place(known: Mapping[str, Any]) -> Place | None:
     """Return the rotation and the translation, or None if the table has neither."""
-    rotation = _first(known, ROTATION)
-    translation = _first(known, TRANSLATION)
+    rotation = first_of(known, ROTATION)
+    translation = first_of(known, TRANSLATION)
     if rotation is not None and translation is not None:
         return matrix_of(rotation), matrix_of(translation)
     check_both(rotation, translation)
@@ -255,9 +266,14 @@ def _place(known: Mapping[str, Any]) -> Place | None:
     return None
 
 
-def _first(known: Mapping[str, Any], names: Sequence[str]) -> Any:
-    """Return the value of the first name in `known`, or None if it has none of them."""
-    return next((known[name] for name in names if name in known), None)
+def _model_keys(known: Mapping[str, Any]) -> list[str]:
+    """Return the keys of a table that name its lens model."""
+    keys = [key for key in MODEL if key in known]
+    # a number under one of the others has another meaning
+    for key in MODEL_TEXTS:
+        if _is_text(known.get(key)):
+            keys.append(key)
+    return keys
 
 
 def _is_fisheye(known: Mapping[str, Any]) -> bool:
@@ -265,9 +281,7 @@ def _is_fisheye(known: Mapping[str, Any]) -> bool:
 
     Raises InputError for a lens model that OpenCV does not have.
     """
-    keys = [key for key in MODEL if key in known]
-    keys += [key for key in MODEL_TEXTS if _is_text(known.get(key))]
-    for key in keys:
+    for key in _model_keys(known):
         model = plain(known[key])
         if model in _FISHEYES:
             return True

@@ -5,7 +5,12 @@ from typing import Any
 
 from posefit.geometry.calibration.dialect import Dialect
 from posefit.geometry.calibration.lens import Calibration, numbers_of, stated
-from posefit.geometry.calibration.values import Stored, check_keys, matrix_of
+from posefit.geometry.calibration.values import (
+    Stored,
+    check_keys,
+    has_table,
+    matrix_of,
+)
 
 REQUIRED = {"K", "distCoef", "R", "t", "resolution"}
 # the other keys say which of the dome's cameras it is
@@ -14,9 +19,7 @@ KEYS = REQUIRED | {"name", "type", "panel", "node"}
 
 def _recognises(stored: Stored) -> bool:
     cameras = stored.values.get("cameras")
-    return isinstance(cameras, list) and any(
-        isinstance(camera, dict) and camera.keys() >= REQUIRED for camera in cameras
-    )
+    return isinstance(cameras, list) and has_table(cameras, REQUIRED)
 
 
 def _read(stored: Stored) -> list[Calibration]:

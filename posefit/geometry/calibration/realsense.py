@@ -61,6 +61,8 @@ def _camera(name: str, table: Mapping[str, Any]) -> Calibration:
     )
 
 
-REALSENSE = Dialect(
-    "RealSense", lambda stored: any(True for _ in _tables(stored)), _read
-)
+def _recognises(stored: Stored) -> bool:
+    return next(_tables(stored), None) is not None
+
+
+REALSENSE = Dialect("RealSense", _recognises, _read)

@@ -23,6 +23,7 @@ from posefit.geometry.calibration.values import (
     Stored,
     check_keys,
     counts,
+    first_of,
     matrix_of,
     number_of,
     plain,
@@ -66,10 +67,10 @@ def _read(stored: Stored) -> list[Calibration]:
         raise InputError(
             f"the lens model {quoted(known['distortionmodel'])}, which is not known"
         )
-    matrix = matrix_of(_first(known, MATRIX))
-    lens = _first(known, LENS)
-    width = number_of(_first(known, ("imagewidth", "width")))
-    height = number_of(_first(known, ("imageheight", "height")))
+    matrix = matrix_of(first_of(known, MATRIX))
+    lens = first_of(known, LENS)
+    width = number_of(first_of(known, ("imagewidth", "width")))
+    height = number_of(first_of(known, ("imageheight", "height")))
     sensor = [width, height]
     matrix, size = _region(known, numbers_of(matrix.reshape(3, 3), (3, 3)), sensor)
     return [
@@ -83,10 +84,6 @@ def _read(stored: Stored) -> list[Calibration]:
             cropped=size != sensor,
         )
     ]
-
-
-def _first(known: Mapping[str, Any], names: tuple[str, ...]) -> Any:
-    return next((known[name] for name in names if name in known), None)
 
 
 def _region(
@@ -104,8 +101,9 @@ def _region(
         raise InputError("the key 'roi' without x_offset, y_offset, width and height")
     offset = np.array([number_of(part.get(f"{axis}offset", 0)) for axis in "xy"])
     sides = [number_of(part.get(side, 0)) for side in ("width", "height")]
+    bins = np.array([number_of(known.get(f"binning{axis}", 0)) for axis in "xy"])
     # a binning of 0 means 1, and sides of 0 mean the whole sensor
-    bins = np.array([number_of(known.get(f"binning{axis}", 0)) or 1.0 for axis in "xy"])
+    bins[bins == 0.0] = 1.0
     if all(sides):
         size = sides
     elif offset.any() or any(sides):
@@ -114,7 +112,8 @@ def _region(
     centre = (matrix[:2, 2] + HALF - offset) / bins - HALF
     if not (bins == 1.0).all() or offset.any():
         matrix = pinhole_matrix(focal, centre)
-    return matrix, [float(side // by) for side, by in zip(size, bins, strict=True)]
+    binned: list[float] = (np.array(size) // bins).tolist()
+    return matrix, binned
 
 
 ROS = Dialect("ROS", _recognises, _read)

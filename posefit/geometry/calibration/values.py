@@ -7,7 +7,7 @@ and a matrix is only as large as the numbers in the file.
 
 import math
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping, Set
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -136,10 +136,8 @@ def matrix_of(value: Any) -> Array:
     ]
     are_sides = all(side.is_integer() and side > 0 for side in shape)
     if not are_sides or numbers.size != math.prod(shape):
-        raise InputError(
-            f"a matrix of {' x '.join(f'{side:g}' for side in shape)} with "
-            f"{numbers.size} numbers"
-        )
+        found = " x ".join(f"{side:g}" for side in shape)
+        raise InputError(f"a matrix of {found} with {numbers.size} numbers")
     return numbers.reshape([int(side) for side in shape])
 
 
@@ -154,6 +152,19 @@ def number_of(value: Any) -> float:
 def numbers_at(table: Mapping[str, Any], *keys: str) -> list[float]:
     """Return the numbers under some keys, all of which must be there."""
     return [number_of(table[key]) for key in keys]
+
+
+def has_table(values: Iterable[Any], keys: Set[str] = frozenset()) -> bool:
+    """Return whether any of some values is a table that has these keys."""
+    return any(isinstance(value, dict) and value.keys() >= keys for value in values)
+
+
+def first_of(table: Mapping[str, Any], keys: Iterable[str]) -> Any:
+    """Return the value of the first key in a table, or None if it has none of them."""
+    for key in keys:
+        if key in table:
+            return table[key]
+    return None
 
 
 def _other(suffix: str) -> InputError:
@@ -190,7 +201,9 @@ def _of_opencv(root: Any) -> dict[str, Any]:
     values = dict[str, Any]()
     for entry in root:
         # a matrix is a tag with tags inside, and everything else is a text
-        parts = {part.tag: (part.text or "").strip() for part in entry}
+        parts = dict[str, str]()
+        for part in entry:
+            parts[part.tag] = (part.text or "").strip()
         values[entry.tag] = parts or (entry.text or "").strip()
     return values
 

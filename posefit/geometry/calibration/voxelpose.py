@@ -21,6 +21,7 @@ from posefit.geometry.calibration.lens import (
 from posefit.geometry.calibration.values import (
     Stored,
     check_keys,
+    has_table,
     matrix_of,
     numbers_at,
 )
@@ -29,10 +30,7 @@ KEYS = {"R", "T", "fx", "fy", "cx", "cy", "k", "p"}
 
 
 def _recognises(stored: Stored) -> bool:
-    return any(
-        isinstance(table, dict) and table.keys() >= KEYS
-        for table in stored.values.values()
-    )
+    return has_table(stored.values.values(), KEYS)
 
 
 def _read(stored: Stored) -> list[Calibration]:

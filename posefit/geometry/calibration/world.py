@@ -72,8 +72,13 @@ def guessed_up(calibrations: Sequence[Calibration]) -> str:
 
 def _image_up(calibrations: Sequence[Calibration]) -> Array | None:
     """Return the images' up direction (3,) in the world, or None without places."""
-    placed = [camera.rotation for camera in calibrations if camera.rotation is not None]
-    return -np.sum([rotation[1] for rotation in placed], axis=0) if placed else None
+    downs = list[Array]()
+    for camera in calibrations:
+        if camera.rotation is not None:
+            downs.append(camera.rotation[1])  # the image's y, which points down
+    if not downs:
+        return None
+    return np.asarray(-np.sum(downs, axis=0))
 
 
 def _axis(direction: Array) -> Up:
