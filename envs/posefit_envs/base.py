@@ -497,10 +497,11 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
             self._own[name] = tuple(values)
             return
         first, *others = values
-        if not all(np.array_equal(first, other) for other in others):
-            raise error.Error(
-                f"{name} must be the same in all environments, got different values"
-            )
+        for other in others:
+            if not np.array_equal(first, other):
+                raise error.Error(
+                    f"{name} must be the same in all environments, got different values"
+                )
         setattr(self, name, first)
 
     # attributes that differ between the environments
@@ -621,7 +622,11 @@ def _seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | No
         return [None] * count
     if not isinstance(seed, Sequence | np.ndarray) or isinstance(seed, str):
         first = checked(whole, "seed", seed, 0)
-        return [first + i for i in range(count)]
+        return list(range(first, first + count))
     if len(seed) != count:
         raise ArgumentError(f"seed must be one number or {count}, got {len(seed)}")
-    return [each if each is None else checked(whole, "seed", each, 0) for each in seed]
+    seeds: list[int | None] = []
+    for each in seed:
+        # None leaves the environment's generator as it is
+        seeds.append(None if each is None else checked(whole, "seed", each, 0))
+    return seeds

@@ -50,7 +50,8 @@ class FitImageSteps:
         if instances is None or isinstance(instances, int | np.integer):
             chosen = [instances] * rows.count
         options = [{"instance": number} for number in chosen]
-        _, infos = rows.reset([seed + i for i in range(rows.count)], options)
+        seeds = list(range(seed, seed + rows.count))
+        _, infos = rows.reset(seeds, options)
         self._numbers = [int(info["instance"]) for info in infos]
         return rows.attribute("space"), self._numbers
 
@@ -260,17 +261,21 @@ def track_reference(
     clips = training_clips(train or world.training, followed=followed)
     motions = training_motions(clips, instance.task.fps)
     task = replace(instance.task, training=motions)
-    tracker_settings = {
-        f"{tracker.partition(':')[0]}.{name}": value for name, value in settings.items()
-    }
+    # a variant, named `tracker:variant`, has the settings of its tracker
+    family = tracker.partition(":")[0]
+    tracker_settings = {}
+    for name, value in settings.items():
+        tracker_settings[f"{family}.{name}"] = value
     method = prepare(TrackOptions(method=tracker, settings=tracker_settings), task)
     frames = method.follow(task, instance.observations, np.random.default_rng(seed))
-    return [
-        committed_infos(
-            instance, k, frame.pose, frame.translation, frame.cost, errors=True
+    infos = []
+    for k, frame in enumerate(frames):
+        infos.append(
+            committed_infos(
+                instance, k, frame.pose, frame.translation, frame.cost, errors=True
+            )
         )
-        for k, frame in enumerate(frames)
-    ]
+    return infos
 
 
 def _stepwise(problem: Problem, optimiser: Optimiser) -> Generator[Array, float, None]:

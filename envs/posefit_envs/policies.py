@@ -79,7 +79,7 @@ def rollout(
     rows = rows_of(env)
     numbers = [instance] * rows.count if isinstance(instance, int) else instance
     options = [{"instance": number} for number in numbers]
-    seeds = [seed + i for i in range(rows.count)]
+    seeds = list(range(seed, seed + rows.count))
     vector = isinstance(env, VectorEnv)
     actions: list[Array] = []
     rewards: list[Array] = []
@@ -92,11 +92,13 @@ def rollout(
         observations, reward, ended, infos = rows.step(actions[-1])
         rewards.append(reward)
         for i in np.flatnonzero(ended).tolist():
-            own = {
-                "actions": np.array([step[i] for step in actions]),
-                "rewards": np.array([float(step[i]) for step in rewards]),
-            }
-            episodes.setdefault(i, infos[i] | own)
+            # an environment that has begun again only waits for the others
+            if i in episodes:
+                continue
+            own_actions = np.array([step[i] for step in actions])  # (k, d)
+            own_rewards = np.array([float(step[i]) for step in rewards])  # (k,)
+            own = {"actions": own_actions, "rewards": own_rewards}
+            episodes[i] = infos[i] | own
         if ended.any() and len(episodes) < rows.count:
             observations, _ = rows.reset(None, options, ended)
     if vector:

@@ -426,7 +426,8 @@ def _bounds(generations: Any) -> tuple[int, int]:
     ends = checked(
         pair, "generations", generations, "two whole numbers such as (100, 220)"
     )
-    least, most = (checked(whole, "generations", number, 1) for number in ends)
+    least = checked(whole, "generations", ends[0], 1)
+    most = checked(whole, "generations", ends[1], 1)
     if least > most:
         raise ArgumentError(
             "generations must be the smallest and the largest budget, "

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from posefit import SearchSpace, SilhouetteCost
 from posefit.arrays import Array, Bits
+from posefit.geometry.camera import stacked
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS
 from posefit.silhouette.cost import mean_over_views, mismatch
 from posefit.silhouette.drawn import count_poses, uncounted
@@ -57,24 +58,33 @@ class SceneRow(NamedTuple):
     @staticmethod
     def of(cost: SilhouetteCost, truth: Array) -> "SceneRow":
         """Return the scene of an observation, and the true pose (66,) in it."""
-        cameras = cost.cameras
-        silhouettes = cost.silhouettes
-        masks = np.stack([silhouette.mask for silhouette in silhouettes], axis=-1)
+        views = stacked(cost.cameras)
+        masks_of_views = []
+        observed = []
+        valid = []
+        borders = []
+        for silhouette in cost.silhouettes:
+            shown, known = silhouette.bits
+            masks_of_views.append(silhouette.mask)
+            observed.append(shown)
+            valid.append(known)
+            borders.append(silhouette.extent)
+        masks = np.stack(masks_of_views, axis=-1)  # (height, width, views)
         return SceneRow(
             centre=cost.space.centre,
             half=cost.space.half,
             anchor=cost.space.anchor,
             offsets=cost.body.skeleton.chain.offsets,
             radii=cost.body.radii,
-            rotations=np.array([camera.rotation for camera in cameras]),
-            places=np.array([camera.translation for camera in cameras]),
-            focals=np.array([camera.focal for camera in cameras]),
-            centres=np.array([camera.centre for camera in cameras]),
-            observed=np.array([silhouette.bits[0] for silhouette in silhouettes]),
-            valid=np.array([silhouette.bits[1] for silhouette in silhouettes]),
+            rotations=views.rotations,
+            places=views.translations,
+            focals=views.focals,
+            centres=views.centres,
+            observed=np.array(observed),
+            valid=np.array(valid),
             totals=np.count_nonzero(masks, axis=(0, 1)),
             joint_radii=cost.body.joint_radii(),
-            borders=np.array([silhouette.extent for silhouette in silhouettes]),
+            borders=np.array(borders),
             truth=truth,
             masks=np.packbits(masks, axis=1),
         )

@@ -299,7 +299,10 @@ class TrackVectorEnv(SearchVectorEnv):
         """Return the infos (n, ...) of the poses that some rows have committed."""
         nothing = nothing_committed(self.world)
         rows = [committed.get(i, nothing) for i in range(self.num_envs)]
-        return {name: np.array([row[name] for row in rows]) for name in nothing}
+        infos: Infos = {}
+        for name in nothing:
+            infos[name] = np.array([row[name] for row in rows])
+        return infos
 
     def _commit(self, rows: Rows, pictures: Image) -> tuple[Flags, dict[int, Infos]]:
         """Commit the best proposals of some environments, and draw their next frames.

@@ -4,7 +4,7 @@ See `posefit.motion.instances` for the numbers.
 """
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Any
@@ -122,17 +122,17 @@ class World:
         if self.train:
             return self.train
         if self.held_out_people:
-            return tuple(
-                style for kind in self.motion for style in styles_of(kind, False)
-            )
-        names = [
-            motion if motion in built_in.names() else "walk" for motion in self.motion
-        ]
-        return tuple(
-            dict.fromkeys(
-                style for name in names for style in built_in.other_styles(name)
-            )
-        )
+            of_others: list[str] = []
+            for kind in self.motion:
+                of_others += styles_of(kind, False)
+            return tuple(of_others)
+        styles: list[str] = []
+        for motion in self.motion:
+            # only built-in motions have styles; for any other, learn from walks
+            name = motion if motion in built_in.names() else "walk"
+            styles += built_in.other_styles(name)
+        # two styles of one kind would bring their common styles twice
+        return tuple(dict.fromkeys(styles))
 
     @property
     def dimensions(self) -> int:
@@ -176,11 +176,11 @@ class World:
 
 def styles_of(kind: str, held_out: bool) -> tuple[str, ...]:
     """Return the styles of a kind of motion, of held-out people or of all others."""
-    return tuple(
-        style
-        for style in built_in.other_styles(kind)
-        if (built_in.person_of(style) in HELD_OUT_PEOPLE) == held_out
-    )
+    styles = []
+    for style in built_in.other_styles(kind):
+        if (built_in.person_of(style) in HELD_OUT_PEOPLE) == held_out:
+            styles.append(style)
+    return tuple(styles)
 
 
 def world_of(own: Sequence[str] = (), /, **arguments: Any) -> World:
@@ -212,15 +212,12 @@ def world_of(own: Sequence[str] = (), /, **arguments: Any) -> World:
     held_out_people = flag("held_out_people", world.held_out_people)
     what = "(width, height) of 36 to 4096 pixels"
     sides = checked(pair, "size", world.size, what)
-    if not all(
-        isinstance(side, int | np.integer) and 36 <= side <= 4096 for side in sides
-    ):
-        raise ArgumentError(f"size must be {what}, got {quoted(world.size)}")
+    for side in sides:
+        if not isinstance(side, int | np.integer) or not 36 <= side <= 4096:
+            raise ArgumentError(f"size must be {what}, got {quoted(world.size)}")
     mismatch = checked(finite_number, "mismatch_percent", world.mismatch_percent)
     checked(between, "mismatch_percent", mismatch, 0.0, 50.0)
-    if isinstance(world.train, str) or not all(
-        isinstance(name, str) for name in world.train or ()
-    ):
+    if isinstance(world.train, str) or not _are_texts(world.train or ()):
         raise ArgumentError(
             "train must be a list of motions such as ['walk-a'], "
             f"got {quoted(world.train)}"
@@ -262,22 +259,20 @@ def flag(name: str, value: object) -> bool:
     return bool(value)
 
 
+def _are_texts(values: Iterable[Any]) -> bool:
+    return all(isinstance(value, str) for value in values)
+
+
 def _motions(motion: Any, held_out_people: bool) -> tuple[str, ...]:
     """Return the motions: one name, several built-in ones, or "all" kinds of them."""
-    kinds = tuple(
-        dict.fromkeys(built_in.activity_of(name) for name in built_in.names())
-    )
+    kinds = tuple(dict.fromkeys(map(built_in.activity_of, built_in.names())))
     if motion == "all":
         names = kinds
     elif isinstance(motion, str):
         names = (motion,)
     else:
         names = motion
-    if (
-        not isinstance(names, Sequence)
-        or not names
-        or not all(isinstance(name, str) for name in names)
-    ):
+    if not isinstance(names, Sequence) or not names or not _are_texts(names):
         raise ArgumentError(
             f"motion must be a name, several, or 'all', got {quoted(motion)}"
         )
@@ -299,19 +294,18 @@ def _views(view_degrees: Any) -> tuple[float, ...]:
     several = isinstance(view_degrees, Sequence | np.ndarray) and not isinstance(
         view_degrees, str
     )
+    views: list[float] = []
     try:
-        views = tuple(
-            finite_number("view_degrees", view)
-            for view in (view_degrees if several else [view_degrees])
-        )
+        for view in view_degrees if several else [view_degrees]:
+            views.append(finite_number("view_degrees", view))
     except ValueError:
-        views = ()
+        views = []
     if not views:
         raise ArgumentError(
             "view_degrees must be a finite number or several, "
             f"got {quoted(view_degrees)}"
         )
-    return views
+    return tuple(views)
 
 
 def _strengths(noise: Any) -> tuple[tuple[str, float], ...]:
@@ -349,9 +343,12 @@ def body_of(motion: str) -> Body:
 @lru_cache(maxsize=32)
 def _learned(prior: str, motion: str, train: tuple[str, ...]) -> Prior:
     skeleton = _source(motion).skeleton
-    angles = np.concatenate(
-        [load_motion(name, FPS).about_axes_of(skeleton).poses[:, 3:] for name in train]
-    )
+    angles_of_motions = []
+    for name in train:
+        # joint angles compare only about the axes of one skeleton
+        own = load_motion(name, FPS).about_axes_of(skeleton)
+        angles_of_motions.append(own.poses[:, 3:])
+    angles = np.concatenate(angles_of_motions)  # (T, 63)
     offer = registry().offer("prior", prior)
     fitted: Prior = offer.factory().fit(angles, skeleton)
     check_prior(fitted, angles, skeleton, offer.label)
@@ -473,23 +470,22 @@ def instance(
     # who walks farther is seen from farther away, and stays in the picture
     reach = DISTANCE + 0.5 * float(np.ptp(truth.translations[:, [0, 2]], axis=0).max())
     turn = rng.uniform(-180.0, 180.0) if world.yaw == "unknown" else 0.0
-    azimuths = [
-        facing + np.radians(view + turn)
-        for view in variation(number).views(world.view_degrees)
-    ]
-    cameras = [
-        Camera.around(middle, azimuth, reach, world.size) for azimuth in azimuths
-    ]
+    azimuths = []
+    cameras = []
+    for view in variation(number).views(world.view_degrees):
+        azimuth = facing + np.radians(view + turn)
+        azimuths.append(azimuth)
+        cameras.append(Camera.around(middle, azimuth, reach, world.size))
     noise = dict(world.noise)
     observations = []
     for pose, place in zip(truth.poses, truth.translations, strict=True):
         # rendering the truth is not an evaluation
         with uncounted():
             shown = [project(body, camera, pose, place) for camera in cameras]
-        masks = [corrupted(mask, noise, rng) for mask in shown]
-        observations.append(
-            Observation([Silhouette.of(mask) for mask in masks], place.copy())
-        )
+        silhouettes = []
+        for mask in shown:
+            silhouettes.append(Silhouette.of(corrupted(mask, noise, rng)))
+        observations.append(Observation(silhouettes, place.copy()))
     yaw = facing + float(np.radians(rng.uniform(-YAW_DEGREES, YAW_DEGREES)))
     if world.yaw == "unknown":
         yaw = azimuths[0]  # facing the camera
