@@ -84,12 +84,21 @@ def parse_asf(path: str | Path, unit: Unit | None = None) -> Acclaim:
     _check_root(sections["root"])
     bones = _bones(sections["bonedata"], np.pi / 180.0 if degrees else 1.0)
     _check_tree(path, sections["hierarchy"], bones)
-    chosen = [bones[name] for name in BONES]
+    vectors = []
+    axes = []
+    for name in BONES:
+        vectors.append(bones[name].vector)
+        axes.append(bones[name].axis)
+    channels = []
+    # of fingers, too: a motion's file has angles for them, and a pose has not
+    for name, bone in bones.items():
+        if bone.free:
+            channels.append((name, bone.free))
     stated = Skeleton(
         name=path.stem,
-        offsets=np.array([bone.vector for bone in chosen]) * metres,
-        axes=rotation_from_joint_angles(np.array([bone.axis for bone in chosen])),
-        channels=tuple((name, bone.free) for name, bone in bones.items() if bone.free),
+        offsets=np.array(vectors) * metres,
+        axes=rotation_from_joint_angles(np.array(axes)),
+        channels=tuple(channels),
         limits=_limits(bones),
     )
     wanted = metres if unit is None else metres_of(unit)
@@ -116,11 +125,14 @@ def parse_asf(path: str | Path, unit: Unit | None = None) -> Acclaim:
 def _limits(bones: dict[str, _Bone]) -> Array | None:
     """Return the limits (63, 2) of the joint angles, or None if some are unknown."""
     limits = np.zeros((ANGLES, 2))
-    free_joints = [JOINTS[joint] for joint in INNER if bones[JOINTS[joint]].free]
-    for name in free_joints:
-        if bones[name].limits is None:
+    for joint in INNER:
+        name = JOINTS[joint]
+        bone = bones[name]
+        if not bone.free:
+            continue
+        if bone.limits is None:
             return None
-        limits[channel_angles(name, bones[name].free)] = bones[name].limits
+        limits[channel_angles(name, bone.free)] = bone.limits
     return limits[3:]
 
 
@@ -303,7 +315,8 @@ def write_asf(path: str | Path, skeleton: Skeleton) -> None:
                 direction = (skeleton.offsets[bone] / length).tolist()
         dof = f"    dof {' '.join(free)}\n" if free else ""
         if skeleton.limits is not None and (angles := channel_angles(name, free)):
-            rows = np.degrees(skeleton.limits[[angle - 3 for angle in angles]]).tolist()
+            # a pose begins with the root's three angles, which have no limits
+            rows = np.degrees(skeleton.limits[np.array(angles) - 3]).tolist()
             pairs = [f"({low!r} {high!r})" for low, high in rows]
             dof += "    limits " + "\n           ".join(pairs) + "\n"
         text.append(

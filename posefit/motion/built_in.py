@@ -44,7 +44,7 @@ def _stored() -> dict[str, Any]:
 def names() -> tuple[str, ...]:
     """Return the names that `motion` accepts."""
     styles = tuple(_stored()["motions"])
-    return tuple(dict.fromkeys(activity_of(name) for name in styles)) + styles
+    return tuple(dict.fromkeys(map(activity_of, styles))) + styles
 
 
 def activity_of(name: str) -> str:
@@ -84,11 +84,15 @@ def stored_skeleton(name: str, stored: Mapping[str, Any]) -> Skeleton:
     limits = None
     if stored["limits_degrees"] is not None:
         limits = np.radians(stored["limits_degrees"])
+    channels = []
+    # JSON has lists for tuples
+    for bone, free in stored["channels"]:
+        channels.append((bone, tuple(free)))
     return Skeleton(
         name,
         np.array(stored["offsets"]),
         rotation_from_joint_angles(np.radians(stored["axes_degrees"])),
-        tuple((bone, tuple(free)) for bone, free in stored["channels"]),
+        tuple(channels),
         limits,
     )
 

@@ -51,11 +51,13 @@ NAMES = {
     "lowerneck": "Neck",
     "upperneck": "Neck1",
     "head": "Head",
-    **{f"l{bone}": f"Left{name}" for bone, name in _LIMBS.items()},
-    **{f"r{bone}": f"Right{name}" for bone, name in _LIMBS.items()},
-    "lhipjoint": "LHipJoint",
-    "rhipjoint": "RHipJoint",
 }
+for _bone, _name in _LIMBS.items():
+    NAMES[f"l{_bone}"] = f"Left{_name}"
+    NAMES[f"r{_bone}"] = f"Right{_name}"
+# the conversions spell these two in another way
+NAMES["lhipjoint"] = "LHipJoint"
+NAMES["rhipjoint"] = "RHipJoint"
 ROTATIONS = "Zrotation Xrotation Yrotation"
 LONGEST_LINE = 100_000  # bytes; a frame of CMU's files has about 1,000
 NODES = 1_000  # joints and ends of a file
@@ -302,10 +304,7 @@ def _head(lines: Iterator[Line]) -> tuple[int, tuple[float, float]]:
             and len(line.words[1]) < 10
         ):
             count = int(line.words[1])
-        elif count >= 0 and [word.lower() for word in line.words[:2]] == [
-            "frame",
-            "time:",
-        ]:
+        elif count >= 0 and " ".join(line.words[:2]).lower() == "frame time:":
             (frame_time,) = line._replace(words=line.words[1:]).numbers(1)
             if not FRAME_TIMES[0] <= frame_time <= FRAME_TIMES[1]:
                 low, high = FRAME_TIMES
@@ -493,7 +492,8 @@ def write_bvh(path: str | Path, motion: Motion) -> None:
     radians = np.swapaxes(angles_about((2, 0, 1), turns), 0, 1)  # (T, joints, 3)
     angles = np.degrees(steady_angles(radians)).reshape(len(motion), -1)
     lines += ["MOTION", f"Frames: {len(motion)}", f"Frame Time: {1.0 / motion.fps!r}"]
-    lines += [_plain(row) for row in np.hstack([motion.translations, angles])]
+    for row in np.hstack([motion.translations, angles]):
+        lines.append(_plain(row))
     Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
 
 

@@ -258,7 +258,8 @@ def _clips(
                 f"{source}: expected a folder with a clip other than the source, "
                 "got only that clip"
             )
-        yield from (clip_of(path, stated) for path in others)
+        for path in others:
+            yield clip_of(path, stated)
     elif _same(source, followed):
         raise InputError(f"train must not contain the source itself, got {source}")
     else:

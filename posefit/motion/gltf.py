@@ -79,7 +79,8 @@ def write_glb(path: str | Path, motion: Motion, radii: Array) -> None:
     )
     turns = skeleton.turns(motion.poses)
     moved = [(0, "translation", motion.translations)]
-    moved += [(joint, "rotation", quaternions(turns[joint])) for joint in (0, *INNER)]
+    for joint in (0, *INNER):
+        moved.append((joint, "rotation", quaternions(turns[joint])))
     samplers: list[dict[str, Any]] = []
     channels: list[dict[str, Any]] = []
     for node, moving, values in moved:
@@ -233,19 +234,19 @@ def _capped_cone(
     length = float(np.linalg.norm(offset))
     down = np.linspace(-0.5 * np.pi, 0.0, CAP)
     up = np.linspace(0.0, 0.5 * np.pi, CAP)
-    rings = [(angle, radii[0], 0.0) for angle in down]
-    rings += [(angle, radii[1], length) for angle in up]
+    # the rings of both half balls: their latitudes, and the balls' radii and middles
+    latitudes = np.concatenate([down, up])
+    ring_radii = np.repeat([radii[0], radii[1]], CAP)
+    ring_middles = np.repeat([0.0, length], CAP)
     around = np.linspace(0.0, 2.0 * np.pi, RING_CORNERS, endpoint=False)
     outward = []  # unit vectors, ring by ring
-    for a, _, _ in rings:
+    for a in latitudes:
         for b in around:
             outward.append((np.cos(a) * np.cos(b), np.sin(a), np.cos(a) * np.sin(b)))
     normals = np.array(outward)
-    scale = np.repeat([radius for _, radius, _ in rings], RING_CORNERS)[:, None]
-    points = scale * normals + np.repeat(
-        [(0.0, base, 0.0) for _, _, base in rings], RING_CORNERS, axis=0
-    )
-    ring, k = np.divmod(np.arange((len(rings) - 1) * RING_CORNERS), RING_CORNERS)
+    points = np.repeat(ring_radii, RING_CORNERS)[:, None] * normals
+    points[:, 1] += np.repeat(ring_middles, RING_CORNERS)
+    ring, k = np.divmod(np.arange((len(latitudes) - 1) * RING_CORNERS), RING_CORNERS)
     low = ring * RING_CORNERS
     high = (ring + 1) * RING_CORNERS
     after = (k + 1) % RING_CORNERS

@@ -10,7 +10,7 @@ between legs and arms are the spine.
 
 import re
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import NamedTuple
 
 # each joint of a side, outwards: its names, and names that other joints have, too
@@ -60,13 +60,13 @@ _JOINED = {
     "rf": ("right", "f"),
 }
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
-_KNOWN = set().union(
-    *(first | second for first, second in _LIMBS.values()), *_MIDDLE.values()
-)
+_KNOWN = set[str]().union(*_MIDDLE.values())
+for _sure, _possible in _LIMBS.values():
+    _KNOWN |= _sure | _possible
 _ENDINGS = {"joint", "jnt", "bone"}
 LEGS = ("thigh", "shin", "foot")
 ARMS = ("arm", "forearm", "hand")
-NEEDED = tuple((side, joint) for side in ("left", "right") for joint in (*LEGS, *ARMS))
+NEEDED = tuple(product(("left", "right"), (*LEGS, *ARMS)))
 LONGEST_NAME = 200  # characters; of a longer name only the end is read
 
 
@@ -226,7 +226,9 @@ def _limbs(
         plainest = [node for node in nodes if parts[node].others == fewest]
         return sorted(plainest, key=lambda node: len(paths[node]))
 
-    nodes = {joint: nodes_named(names) for joint, (names, _) in _LIMBS.items()}
+    nodes = {}
+    for joint, (names, _) in _LIMBS.items():
+        nodes[joint] = nodes_named(names)
     # `shoulder` is the arm, unless there is an `upperarm` below: then the clavicle
     for joint in ("thigh", "arm", "clavicle"):
         if not nodes[joint] and not (
@@ -239,7 +241,11 @@ def _limbs(
         if not nodes[absent] and len(two) > 1 and two[0] in paths[two[1]]:
             nodes[above] = two[:1]
             nodes[below] = two[1:]
-    return {joint: named[0] for joint, named in nodes.items() if named}
+    nearest = {}
+    for joint, named in nodes.items():
+        if named:
+            nearest[joint] = named[0]
+    return nearest
 
 
 def _missing(

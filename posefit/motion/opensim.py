@@ -106,17 +106,17 @@ def write_osim(path: str | Path, body: Body, markers: Sequence[str]) -> None:
             shape=(offset, body.radii[bone]),
         )
         at = skeleton.offsets[start - 1] if start else np.zeros(3)
-        turns = [f"{name}_{_TURNS[axis]}" for axis in JOINT_ORDER]
-        if any(turn in free for turn in turns):
-            kind = "CustomJoint"
-        else:
-            kind = "WeldJoint"
+        turns = []
+        for axis in JOINT_ORDER:
+            turn = f"{name}_{_TURNS[axis]}"
+            # an axis about which the joint cannot turn has no coordinate
+            turns.append(turn if turn in free else "")
+        kind = "CustomJoint" if any(turns) else "WeldJoint"
         joint = _joint(
             joints, kind, name, f"/bodyset/{JOINTS[start]}", at, skeleton.axes[bone]
         )
         if kind == "CustomJoint":
-            own = [turn if turn in free else "" for turn in turns]
-            _mobile(joint, own, np.eye(3)[list(JOINT_ORDER)], ("", "", ""), skeleton)
+            _mobile(joint, turns, np.eye(3)[list(JOINT_ORDER)], ("", "", ""), skeleton)
         _marker(marked, markers[bone + 1], name, offset)
     indent(document)
     ElementTree(document).write(path, encoding="utf-8", xml_declaration=True)

@@ -230,5 +230,7 @@ def named(name: str) -> Sequence[RecordedClip]:
 def leaving_out(name: str, subjects: Iterable[str]) -> str:
     """Return the library's name with more people left out."""
     named(name)  # raises an error if the name is invalid
-    people = [name.partition(":")[2], *(f"-{subject}" for subject in subjects)]
+    people = [name.partition(":")[2]]
+    for subject in subjects:
+        people.append(f"-{subject}")
     return f"{LIBRARY}:{','.join(filter(None, people))}"

@@ -179,10 +179,9 @@ class _Bone:
         """
         if start.at is None or start.rest is None or end.at is None or end.rest is None:
             return cls(node)
-        ends = (start.at, end.at), (start.rest, end.rest)
-        return cls(
-            node, *((1.0 - share) * first + share * last for first, last in ends)
-        )
+        at = (1.0 - share) * start.at + share * end.at
+        rest = (1.0 - share) * start.rest + share * end.rest
+        return cls(node, at, rest)
 
 
 class _Rest(NamedTuple):
@@ -565,10 +564,9 @@ def _like_rest(rig: Rig, bones: Sequence[_Bone]) -> _Rest:
         return own
     count = rig.moving[0].shape[1]
     frames = range(0, count, max(1, count // POSES))
-    poses = [
-        own,
-        *(pose(False, rig.moving[0][:, k], rig.moving[1][:, k]) for k in frames),
-    ]
+    poses = [own]
+    for k in frames:
+        poses.append(pose(False, rig.moving[0][:, k], rig.moving[1][:, k]))
     off = []
     for each in poses:
         of_legs = (degrees_off(each, legs) ** 2).sum()

@@ -71,9 +71,10 @@ def low(feet: Array, fps: float, seconds: float, height: float) -> NDArray[np.bo
             the window, in metres.
     """
     reach = max(round(0.5 * seconds * fps), 1)
-    lowest = np.array(
-        [feet[max(k - reach, 0) : k + reach + 1, :, 1].min() for k in range(len(feet))]
-    )
+    lowest = np.empty(len(feet))
+    for k in range(len(feet)):
+        window = feet[max(k - reach, 0) : k + reach + 1]
+        lowest[k] = window[:, :, 1].min()
     return np.asarray(feet[:, :, 1] < lowest[:, None] + height)
 
 
