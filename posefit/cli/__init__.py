@@ -62,9 +62,11 @@ class _Commands(Command, Group):
 def _added() -> dict[str, click.Command]:
     from posefit.registry import COMMAND, plugins_of
 
-    added = plugins_of((COMMAND,), tuple(main.commands))
-    commands = [command for plugin in added for command in plugin.commands]
-    return {command.name or "": command for command in commands}
+    commands = {}
+    for plugin in plugins_of((COMMAND,), tuple(main.commands)):
+        for command in plugin.commands:
+            commands[command.name or ""] = command
+    return commands
 
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})

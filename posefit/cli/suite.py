@@ -1,6 +1,6 @@
 """`posefit suite`."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,7 @@ from posefit.errors import InputError
 from posefit.footage.options import text_range
 
 if TYPE_CHECKING:
-    from posefit.suites.running import SuiteScore
+    from posefit.suites.running import SuiteRun, SuiteScore
 
 
 @click.group(cls=Group, invoke_without_command=True)
@@ -137,17 +137,18 @@ def suite_run(
                 f"it has dimensions {listed(function.dimensions)}"
             )
         chosen = settings.parse_texts(optimiser, registry().optimiser(optimiser), texts)
-        asked = (
-            run_on(
-                problem,
-                optimiser,
-                chosen,
-                evaluations=budget * problem.dimension,
-                seed=seed,
-            )
-            for problem in problems
-        )
-        runs = list(progress(asked, len(problems), "run"))
+
+        def asked() -> "Iterator[SuiteRun]":
+            for problem in problems:
+                yield run_on(
+                    problem,
+                    optimiser,
+                    chosen,
+                    evaluations=budget * problem.dimension,
+                    seed=seed,
+                )
+
+        runs = list(progress(asked(), len(problems), "run"))
     scores = suite_scores(runs)
     print_result(_score_lines(scores), [asdict(score) for score in scores], as_json)
 

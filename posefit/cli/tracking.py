@@ -110,7 +110,8 @@ def fit(as_json: bool, verbose: bool, quiet: bool, **options: Any) -> None:
     shown = Progress() if quiet else Progress(say)
     with results_alone() if as_json else nullcontext():
         result = run(progress=shown, **_arguments(options))
-    more = {"pose_degrees": [round(math.degrees(angle), 6) for angle in result.pose]}
+    pose_degrees = [round(math.degrees(angle), 6) for angle in result.pose]
+    more = {"pose_degrees": pose_degrees}
     hints = {kind: HINTS[kind] for kind in ("html", "png")}
     _print(result.track.content, as_json, more, options, verbose, hints)
 
