@@ -21,7 +21,7 @@ from posefit.fitting.body_kernels import (
 )
 from posefit.fitting.tracker import Frame, Observation
 from posefit.geometry.body import Body
-from posefit.geometry.camera import Camera
+from posefit.geometry.camera import Camera, stacked
 from posefit.geometry.kernels import Chain
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, PARENTS
 from posefit.silhouette.cost import mean_over_views, mismatch
@@ -107,9 +107,9 @@ class ObservedFrames:
             known.append([view for view in views if row[view].known] or views)
         observed = []
         for view in zip(*stacks, strict=True):
-            observed.append(
-                Observed(*(np.array(part) for part in zip(*view, strict=True)))
-            )
+            # the columns of all frames: two arrays of bits, and the numbers of pixels
+            columns = zip(*view, strict=True)
+            observed.append(Observed(*map(np.array, columns)))
         return cls(observed, np.array(borders), known)
 
     def areas(
@@ -241,9 +241,6 @@ class HeldFrames:
         """Move places (m, f, 3) to where bodies fill the silhouettes' boxes."""
         joints = np.empty((*places.shape[:2], len(JOINTS), 3))
         place_bodies(self.body.skeleton.chain, bodies.offsets, self.poses, joints)
-        cameras = tuple(
-            np.array([getattr(camera, name) for camera in self.cameras])
-            for name in ("rotation", "translation", "focal", "centre")
-        )
+        cameras = tuple(stacked(self.cameras))
         borders = self.frames.borders
         align_bodies(joints, _joint_radii(bodies.radii), cameras, borders, places)

@@ -282,15 +282,17 @@ def _sample(
     spread = start.spread
     if start.others:
         starts = [start, *start.others]
+        means = []
+        spreads = []
+        for each in starts:
+            means.append(each.mean)
+            spreads.append(each.spread)
         weights = np.array([each.weight for each in starts])
         rows = rng.choice(len(starts), count, p=weights / weights.sum())
-        mean, spread = (
-            np.array([getattr(each, name) for each in starts])[rows]
-            for name in ("mean", "spread")
-        )
-    mean, spread = (
-        np.broadcast_to(values, (count, space.dimensions)) for values in (mean, spread)
-    )
+        mean = np.array(means)[rows]  # (count, d)
+        spread = np.array(spreads)[rows]
+    mean = np.broadcast_to(mean, (count, space.dimensions))
+    spread = np.broadcast_to(spread, (count, space.dimensions))
     drawn = wrap(space, rng.normal(mean, spread))  # SAPSO (6)
     for _ in range(REDRAWS):
         outside = np.abs(drawn) > 1.0

@@ -88,11 +88,11 @@ def with_carried(frame: Any, state: Mapping[str, Any] | None) -> Any:
 
 
 def _fields(space: SearchSpace) -> dict[str, Any]:
-    return {
-        field.name: _kept(getattr(space, field.name), space, None)
-        for field in fields(space)
-        if field.init and field.name not in FIXED
-    }
+    kept = {}
+    for field in fields(space):
+        if field.init and field.name not in FIXED:
+            kept[field.name] = _kept(getattr(space, field.name), space, None)
+    return kept
 
 
 def _kept(value: Any, space: Any, rng: Any) -> Any:

@@ -13,7 +13,7 @@ from posefit.fitting.check import at_least, between
 from posefit.fitting.kernels import move_to_borders
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.body import Body
-from posefit.geometry.camera import Camera
+from posefit.geometry.camera import Camera, stacked
 from posefit.silhouette.cost import (
     BETA,
     check_square,
@@ -75,17 +75,12 @@ def align(
     """
     translations = writeable(anchors.copy())
     radii = body.joint_radii()
-    views = (
-        np.array([camera.rotation for camera in cameras]),
-        np.array([camera.translation for camera in cameras]),
-        np.array([camera.focal for camera in cameras]),
-        np.array([camera.centre for camera in cameras]),
-        np.array([silhouette.extent for silhouette in silhouettes]),
-    )
+    views = stacked(cameras)
+    extents = np.array([silhouette.extent for silhouette in silhouettes])
 
     def move(part: slice) -> None:
         joints = writeable(body.skeleton.joints(poses[part]))
-        move_to_borders(joints, radii, *views, translations[part])
+        move_to_borders(joints, radii, *views, extents, translations[part])
 
     work_through(parts_of(len(poses), threads), threads, lambda _: (), move)
     return translations
@@ -185,13 +180,15 @@ class SilhouetteCost:
         See `posefit.silhouette.mask`.
         """
         if factor not in self._coarser:
+            cameras = []
+            silhouettes = []
+            for camera, silhouette in zip(self.cameras, self.silhouettes, strict=True):
+                cameras.append(coarser_camera(camera, factor))
+                silhouettes.append(coarser_silhouette(silhouette, factor))
             self._coarser[factor] = replace(
                 self,
-                cameras=[coarser_camera(camera, factor) for camera in self.cameras],
-                silhouettes=[
-                    coarser_silhouette(silhouette, factor)
-                    for silhouette in self.silhouettes
-                ],
+                cameras=cameras,
+                silhouettes=silhouettes,
                 blank=True,  # a small silhouette may be empty
             )
         return self._coarser[factor]
@@ -236,9 +233,9 @@ class SilhouetteCost:
 
     def _cost(self, poses: Array, translations: Array) -> Array:
         """Return the costs (n,) of decoded poses at translations, on one thread."""
-        by_view = [
-            costs_in(*view, poses, translations, self.beta) for view in self._drawings
-        ]
+        by_view = []
+        for view in self._drawings:
+            by_view.append(costs_in(*view, poses, translations, self.beta))
         return mean_over_views(by_view)
 
     def _aligned(self, poses: Array, translations: Array) -> Array:

@@ -40,10 +40,11 @@ class Audit:
     @property
     def warnings(self) -> list[str]:
         """One line for each kind: its first finding, and the number of frames."""
-        return [
-            f"{first} ({count} such frame{'s' if count > 1 else ''})"
-            for first, count in self._findings.values()
-        ]
+        lines = []
+        for first, count in self._findings.values():
+            frames = "frames" if count > 1 else "frame"
+            lines.append(f"{first} ({count} such {frames})")
+        return lines
 
     def clear(self) -> None:
         """Forget all findings."""

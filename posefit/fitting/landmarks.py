@@ -19,10 +19,11 @@ _TOGETHER = (
 # numbers of groups
 LEGS = 0
 ARMS = 1
-GROUPS = [
-    np.array([JOINTS.index(side + bone) for side in "lr" for bone in bones])
-    for bones in _TOGETHER
-]
+GROUPS = []  # the joints of each group, the left ones first
+for _bones in _TOGETHER:
+    _lefts = [JOINTS.index(f"l{_bone}") for _bone in _bones]
+    _rights = [JOINTS.index(f"r{_bone}") for _bone in _bones]
+    GROUPS.append(np.array(_lefts + _rights))
 MIRRORED = np.array(MIRROR)  # (27,) the joint that each is exchanged with
 # Metres between a joint and its landmark. Much longer distances count little more.
 DEVIATION = 0.05
@@ -123,10 +124,11 @@ def side_odds(likelihoods: Array) -> Array:
     """
     limb = np.arange(len(likelihoods)) % len(GROUPS)
     usual = usually_exchanged(likelihoods)
-    return np.array(
-        [
-            landmark_costs(likelihoods[limb == group, ::-1], usual[limb == group])
-            - landmark_costs(likelihoods[limb == group], usual[limb == group])
-            for group in (LEGS, ARMS)
-        ]
-    )
+    odds = []
+    for group in (LEGS, ARMS):
+        own = limb == group
+        as_it_is = landmark_costs(likelihoods[own], usual[own])
+        # with the columns swapped, the pose has its left and right limbs exchanged
+        exchanged = landmark_costs(likelihoods[own, ::-1], usual[own])
+        odds.append(exchanged - as_it_is)
+    return np.array(odds)

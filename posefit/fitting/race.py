@@ -44,9 +44,14 @@ def race(starts: Sequence[Start], search: Search, budget: int) -> list[list[Prob
     if len(likely) == 1:
         return [[search(likely[0], budget)]]
     short = short_budget // len(likely)
-    raced = [(start, [search(start, short)]) for start in likely]
+    raced = []
+    remaining = budget
+    for start in likely:
+        problem = search(start, short)
+        raced.append((start, [problem]))
+        # a search may end early, and leave more for the finalists
+        remaining -= problem.evaluations
     raced.sort(key=lambda each: each[1][0].best_cost)
-    remaining = budget - sum(problems[0].evaluations for _, problems in raced)
     for number in range(FINALISTS):
         start, problems = raced[number]
         share = remaining // (FINALISTS - number)

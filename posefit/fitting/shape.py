@@ -100,9 +100,11 @@ ROUNDS = ((0.5, 60), (0.2, 20))
 
 def _members(groups: dict[str, tuple[str, ...]]) -> Array:
     """Return which bones belong to which group, (26, groups) of 0 and 1."""
-    return np.array(
-        [[float(kind(bone) in group) for group in groups.values()] for bone in BONES]
-    )
+    members = np.zeros((len(BONES), len(groups)))
+    for row, bone in enumerate(BONES):
+        for column, kinds in enumerate(groups.values()):
+            members[row, column] = kind(bone) in kinds
+    return members
 
 
 def _covariance() -> Array:
@@ -187,10 +189,8 @@ class Shape:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the build's entry in summary.json."""
-        factors, spread = (
-            dict(zip(NAMES, values.tolist(), strict=True))
-            for values in (self.factors, self.spread)
-        )
+        factors = dict(zip(NAMES, self.factors.tolist(), strict=True))
+        spread = dict(zip(NAMES, self.spread.tolist(), strict=True))
         return {
             "stature_m": self.body.stature,
             "cost": self.cost,
@@ -277,8 +277,12 @@ def _search(
     def evaluate(proposals: Array) -> Array:
         """Return the costs (m,) of proposals, with a pull to the average build."""
         points = REACH * proposals  # in spreads of people
-        logs = np.array([_ROOT @ point for point in points])
-        pulls = np.array([PULL * float(point @ point) for point in points])
+        logs = np.empty_like(points)
+        pulls = np.empty(len(points))
+        # one by one: how a product of matrices is rounded depends on their sizes
+        for k, point in enumerate(points):
+            logs[k] = _ROOT @ point
+            pulls[k] = PULL * float(point @ point)
         return np.asarray(cost(np.exp(logs)) + pulls)
 
     mean = np.clip(np.linalg.solve(_ROOT, np.log(start)) / REACH, -1.0, 1.0)

@@ -85,11 +85,12 @@ def starts_in(
             cost.coarser(factor)(poses) + INFEASIBLE_COST * ~space.feasible(poses)
         )
     least = min(float(each.min()) for each in costs)
-    weights = [float(np.exp((least - each) / TEMPERATURE).sum()) for each in costs]
+
     spread = np.full(space.dimensions, MODE_SPREAD)
     velocity = np.zeros(space.dimensions)
     starts = []
-    for poses, each, weight in zip(projected, costs, weights, strict=True):
+    for poses, each in zip(projected, costs, strict=True):
+        weight = float(np.exp((least - each) / TEMPERATURE).sum())
         starts.append(Start(poses[each.argmin()], spread, velocity, weight))
     return sorted(starts, key=lambda start: -start.weight)
 

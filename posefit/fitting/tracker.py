@@ -613,8 +613,10 @@ def _frame(
     # rasterising the result again is no evaluation
     with uncounted():
         areas = best.cost_and_areas(poses, translations)[1][:, 0]
-    problems = [problem for mode in searches for problem in mode]
-    evaluations = guess_evaluations + sum(each.evaluations for each in problems)
+    evaluations = guess_evaluations
+    for problems in searches:
+        for problem in problems:
+            evaluations += problem.evaluations
     used, costs = best.trace
     # the trace of the best search, as if it came after all others
     trace = np.column_stack([used + (evaluations - best.evaluations), costs])
@@ -632,8 +634,13 @@ def _frame(
 
 def _posterior(searches: Sequence[Sequence[Problem]]) -> Posterior:
     """Return the posterior of a frame, from the results of searching its modes."""
-    bests = [cheapest(problems) for problems in searches]
-    decoded = [best.decode(best.best[None]) for best in bests]
-    poses = np.concatenate([poses for poses, _ in decoded])
-    places = np.concatenate([places for _, places in decoded])
-    return posterior_of(poses, places, np.array([best.best_cost for best in bests]))
+    poses = []
+    places = []
+    costs = []
+    for problems in searches:
+        best = cheapest(problems)
+        pose, place = best.decode(best.best[None])
+        poses.append(pose)
+        places.append(place)
+        costs.append(best.best_cost)
+    return posterior_of(np.concatenate(poses), np.concatenate(places), np.array(costs))
