@@ -312,10 +312,12 @@ def _certainty(
     truth = scene.truth
     sides = np.full(len(frames), np.nan)
     radius_mm = np.full(len(frames), np.nan)
-    lost = np.array([np.nan if frame.lost is None else frame.lost for frame in frames])
+    lost = np.full(len(frames), np.nan)
     inside: list[NDArray[np.bool_]] = []
     radii_mm: list[Array] = []
     for k, frame in enumerate(frames):
+        if frame.lost is not None:
+            lost[k] = frame.lost
         if frame.posterior is None:
             continue
         sides[k] = unknown_sides(skeleton, frame.posterior, frame.pose)
@@ -347,7 +349,10 @@ def _by_level(frames: Sequence[NDArray[Any]]) -> dict[str, float] | None:
     if not frames:
         return None
     means = np.mean(frames, axis=(0, 2))  # (levels,)
-    return {f"{100 * LEVELS[k]:.0f}": float(mean) for k, mean in enumerate(means)}
+    by_level = {}
+    for level, mean in zip(LEVELS, means.tolist(), strict=True):
+        by_level[f"{100 * level:.0f}"] = mean
+    return by_level
 
 
 def _steadiness(scene: Scene, frames: Sequence[Frame]) -> dict[str, Any]:
@@ -467,7 +472,7 @@ def anytime_trace(frames: Sequence[Frame]) -> dict[str, list[float]]:
         costs.append(trace[rows, 1])
     mean = np.mean(costs, axis=0)  # (points,)
     return {
-        "evaluations": [int(point) for point in points],
+        "evaluations": points.astype(np.int64).tolist(),
         "cost": [float(f"{cost:.6g}") for cost in mean],
     }
 

@@ -47,7 +47,8 @@ class Measure:
     def shown(self, value: float | None) -> str:
         """Return a value with its label and unit, such as `MPJPE 18 mm`."""
         words = (self.label, self.number(value), self.unit)
-        return " ".join(word for word in words if word)
+        # some figures have no unit
+        return " ".join(filter(None, words))
 
 
 def _figure(*figure: Any) -> Any:
@@ -228,7 +229,6 @@ class Measures:
     )
 
 
-MEASURES = {
-    figure.name: Measure(figure.name, *figure.metadata["measure"])
-    for figure in fields(Measures)
-}
+MEASURES = dict[str, Measure]()
+for _field in fields(Measures):
+    MEASURES[_field.name] = Measure(_field.name, *_field.metadata["measure"])

@@ -366,11 +366,10 @@ class Trust:
         return self.sentence
 
 
-SIGNS: dict[str, Sign] = {
-    each.name: each.metadata["sign"]
-    for each in fields(Trust)
-    if "sign" in each.metadata
-}
+SIGNS = dict[str, Sign]()
+for _field in fields(Trust):
+    if "sign" in _field.metadata:
+        SIGNS[_field.name] = _field.metadata["sign"]
 
 
 def signs_against(figures: Mapping[str, Any]) -> list[tuple[Grade, str]]:
@@ -496,9 +495,10 @@ def trust_of(
     # smoothing would hide how much depths jump, so use the tracker's frames
     places = np.array([frame.translation for frame in tracked])  # (T, 3)
     depths = places @ camera.rotation[2] + camera.translation[2]
-    turns = np.array(
-        [frame.pose[0] - facing(camera, frame.translation) for frame in frames]
-    )
+    # how far the person is turned away from the camera, in radians
+    turns = np.empty(len(frames))
+    for k, frame in enumerate(frames):
+        turns[k] = frame.pose[0] - facing(camera, frame.translation)
     radii = table["interval_mm"][usable]
     # each of `SIGNS`, as its figure or as the reason why it is unknown
     signs: dict[str, float | str] = {
@@ -546,8 +546,14 @@ def trust_of(
             TOO_FEW,
         ),
     }
-    reasons = {name: value for name, value in signs.items() if isinstance(value, str)}
-    figures: dict[str, Any] = {**signs, **dict.fromkeys(reasons)}
+    reasons = dict[str, str]()
+    figures = dict[str, Any]()
+    for name, value in signs.items():
+        if isinstance(value, str):
+            reasons[name] = value
+            figures[name] = None
+        else:
+            figures[name] = value
     ratio = figures["size_ratio"]
     stature = scene.body.stature
     figures |= {

@@ -115,6 +115,7 @@ def performance_profile(errors: ArrayLike, levels: ArrayLike) -> Array:
     array = finite("errors", errors, ("methods", "instances", "seeds"))
     edges = finite("levels", levels, ("levels",))
     runs = np.sort(array.reshape(len(array), -1), axis=1)  # (methods, runs)
-    return np.array(
-        [np.searchsorted(row, edges, side="right") / len(row) for row in runs]
-    )
+    shares = np.empty((len(runs), len(edges)))
+    for k, row in enumerate(runs):
+        shares[k] = np.searchsorted(row, edges, side="right") / len(row)
+    return shares

@@ -92,9 +92,10 @@ class Recalibration:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the constructor's arguments as values for JSON."""
-        return {
-            name: np.round(value, DIGITS).tolist() for name, value in vars(self).items()
-        }
+        rounded = {}
+        for name, value in vars(self).items():
+            rounded[name] = np.round(value, DIGITS).tolist()
+        return rounded
 
 
 def reliability(

@@ -114,11 +114,14 @@ class Posterior:
 
         The modes are not part of the result.
         """
-        arrays = {name: getattr(self, name).round(DIGITS).tolist() for name in ARRAYS}
-        corrections = None
+        stored = dict[str, Any]()
+        for name in ARRAYS:
+            stored[name] = getattr(self, name).round(DIGITS).tolist()
+        stored["coherent"] = self.coherent
+        stored["recalibration"] = None
         if self.recalibration is not None:
-            corrections = self.recalibration.as_dict()
-        return {**arrays, "coherent": self.coherent, "recalibration": corrections}
+            stored["recalibration"] = self.recalibration.as_dict()
+        return stored
 
     @classmethod
     def from_dict(cls, stored: Mapping[str, Any]) -> Self:
@@ -261,14 +264,22 @@ def track_modes(
     """
     # otherwise row k of different frames would not be one track
     coherent = [frame for frame in posteriors if frame is not None and frame.coherent]
-    if len(coherent) < len(posteriors) or len({len(frame) for frame in coherent}) != 1:
+    counts = {len(frame) for frame in coherent}
+    if len(coherent) < len(posteriors) or len(counts) != 1:
         return []
-    distances = np.mean(
-        [poses_apart(skeleton, frame.poses, frame.poses) for frame in coherent], axis=0
-    )
-    weights = np.mean([frame.weights for frame in coherent], axis=0)
-    poses = np.array([frame.poses for frame in coherent])
-    translations = np.array([frame.translations for frame in coherent])
+    poses_of_frames = []
+    places_of_frames = []
+    weights_of_frames = []
+    distances_of_frames = []
+    for frame in coherent:
+        poses_of_frames.append(frame.poses)
+        places_of_frames.append(frame.translations)
+        weights_of_frames.append(frame.weights)
+        distances_of_frames.append(poses_apart(skeleton, frame.poses, frame.poses))
+    poses = np.array(poses_of_frames)  # (T, K, 66)
+    translations = np.array(places_of_frames)  # (T, K, 3)
+    weights = np.mean(weights_of_frames, axis=0)  # (K,)
+    distances = np.mean(distances_of_frames, axis=0)  # (K, K)
     clusters = clusters_of(distances, weights, apart)
     tracks = []
     for weight, row, _ in clusters:

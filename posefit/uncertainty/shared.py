@@ -63,7 +63,9 @@ def in_footage(model: Recalibration, cameras: int, height_known: bool) -> Recali
     return replace(model, joint_spreads=about_root, place_spreads=in_world, depth=depth)
 
 
-_PART_OF = {name: part for part, names in PARTS.items() for name in names}
+_PART_OF = dict[str, str]()
+for _part, _kinds in PARTS.items():
+    _PART_OF.update(dict.fromkeys(_kinds, _part))
 _PARTS_OF_JOINTS = [_PART_OF[kind(joint)] for joint in JOINTS]
 
 
