@@ -210,10 +210,8 @@ def _header(
     start = file.tell()
     if dtype.kind not in KINDS or not dtype.itemsize:
         raise _RefusedError(f"{name} of {cut(str(dtype))}")
-    if (
-        any(side < 0 for side in shape)
-        or math.prod(shape) * dtype.itemsize != size - start
-    ):
+    stated_size = math.prod(shape) * dtype.itemsize
+    if min(shape, default=0) < 0 or stated_size != size - start:
         raise _RefusedError(f"{name} of {size - start} bytes for shape {quoted(shape)}")
     return shape, fortran, dtype, start
 

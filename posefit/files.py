@@ -295,7 +295,8 @@ def other_entries(folder: Path, names: Iterable[str]) -> list[str]:
 def emptied(folder: Path, names: Iterable[str]) -> None:
     """Remove plain files by name from a folder, and the folder if it is then empty."""
     with suppress(OSError):
-        for path in (folder / name for name in names):
+        for name in names:
+            path = folder / name
             if path.is_file() and not path.is_symlink():
                 path.unlink()
         folder.rmdir()

@@ -57,9 +57,14 @@ def _namespaces(function: Any) -> list[Mapping[str, Any]]:
         made = [getattr(function, name) for name in ("__init__", "__new__")]
     elif not hasattr(function, "__globals__"):
         made = [type(function).__call__]
-    spaces = [getattr(inspect.unwrap(each), "__globals__", None) for each in made]
+    spaces = []
+    for each in made:
+        spaces.append(getattr(inspect.unwrap(each), "__globals__", None))
     module = sys.modules.get(getattr(function, "__module__", None) or "")
-    return [space for space in (*spaces, vars(module) if module else None) if space]
+    if module:
+        spaces.append(vars(module))
+    # a function that is written in C has no globals
+    return [space for space in spaces if space]
 
 
 def checkable(hint: Any) -> bool:
@@ -148,7 +153,10 @@ def _values(text: str) -> list[Any]:
         except ValueError:
             continue
     if "," in text:
-        values.append(tuple(_values(part)[0] for part in text.split(",")))
+        members = []
+        for part in text.split(","):
+            members.append(_values(part)[0])
+        values.append(tuple(members))
     return [*values, text]
 
 

@@ -94,7 +94,16 @@ def without_settings(text: str) -> str:
 
 def names(factory: Callable[..., Any]) -> list[str]:
     """Return the names of a factory's settings."""
-    return [setting.name for setting in settings_of(factory)]
+    return list(_by_name(factory))
+
+
+def _by_name(factory: Callable[..., Any]) -> dict[str, Setting]:
+    return {setting.name: setting for setting in settings_of(factory)}
+
+
+def _defaults(factory: Callable[..., Any]) -> dict[str, Any]:
+    """Return the default values of a factory's settings by name."""
+    return {setting.name: setting.default for setting in settings_of(factory)}
 
 
 def check(
@@ -112,7 +121,7 @@ def check(
     Raises:
         InputError: a setting is unknown, or its value has a wrong type.
     """
-    known = {setting.name: setting for setting in settings_of(factory)}
+    known = _by_name(factory)
     values = {}
     for name, value in chosen.items():
         setting = _known(plugin, name, known)
@@ -142,7 +151,7 @@ def planned(
         InputError: the population is larger than the budget. It might not fit the
             memory.
     """
-    known = {setting.name: setting.default for setting in settings_of(factory)}
+    known = _defaults(factory)
     filled = dict(chosen)
     asked = filled.get("population_size")
     if isinstance(asked, int) and asked > evaluations:
@@ -163,7 +172,7 @@ def population(
     factory: Callable[..., Any], chosen: Mapping[str, Any], evaluations: int
 ) -> int:
     """Return how many proposals an optimiser makes at a time, or 1 if unknown."""
-    known = {setting.name: setting.default for setting in settings_of(factory)}
+    known = _defaults(factory)
     default_size = known.get("population_size", 1)
     filled = planned(factory, chosen, evaluations)
     size = filled.get("population_size", default_size)
@@ -180,7 +189,7 @@ def parse(
     Raises:
         InputError: a setting is unknown, or its text does not fit its type.
     """
-    known = {setting.name: setting for setting in settings_of(factory)}
+    known = _by_name(factory)
     values = {}
     for name, text in chosen.items():
         setting = _known(plugin, name, known)

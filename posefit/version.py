@@ -72,7 +72,7 @@ def _files_of(package: object) -> Iterator[tuple[str, Path]]:
                 inner.clear()
                 continue
             seen.add(place)
-            inner[:] = sorted(name for name in inner if _counts(name))
+            inner[:] = sorted(filter(_counts, inner))
             for name in sorted(filter(_counts, names)):
                 path = Path(folder, name)
                 if path.is_file():

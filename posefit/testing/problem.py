@@ -21,9 +21,10 @@ COMPONENTS = 6  # m of the SAPSO paper, section 2.1
 
 def walking_angles() -> Array:
     """Return the joint angles (T, 63) of the built-in walks other than `walk`."""
-    return np.concatenate(
-        [built_in.motion(style).poses[:, 3:] for style in built_in.other_styles("walk")]
-    )
+    angles = []
+    for style in built_in.other_styles("walk"):
+        angles.append(built_in.motion(style).poses[:, 3:])
+    return np.concatenate(angles)
 
 
 def principal(angles: Array) -> Components:

@@ -64,7 +64,10 @@ def check_in_process(
             raise InputError(
                 f"{kind} {name!r}: it must load in a separate process; {blame}"
             )
-        done += [Result(**message) for message in messages if "outcome" in message]
+        for message in messages:
+            # the others say that a check begins
+            if "outcome" in message:
+                done.append(Result(**message))
         # the process ended during this check: it failed, and the next ones get a new
         # process
         if "outcome" not in messages[-1]:

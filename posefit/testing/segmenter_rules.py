@@ -197,11 +197,13 @@ def speed(case: Case) -> str:
     """A picture of 320 x 240 takes less than a second."""
     segmenter = case.build()
     images = painted()[0].images[16:20]
-    return check_speed(
-        "a picture",
-        MAX_SECONDS,
-        lambda _: len([segmenter.segment(image) for image in images]),
-    )
+
+    def segment_all(_: int) -> int:
+        for image in images:
+            segmenter.segment(image)
+        return len(images)
+
+    return check_speed("a picture", MAX_SECONDS, segment_all)
 
 
 RULES = [

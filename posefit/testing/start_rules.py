@@ -83,7 +83,9 @@ def posterior(case: Case) -> str:
     """A frame gives a Posterior of finite poses, or None."""
     for guess in case.first:
         _check_guess(guess)
-    counts = ["none" if guess is None else str(len(guess)) for guess in case.first]
+    counts = []
+    for guess in case.first:
+        counts.append("none" if guess is None else str(len(guess)))
     return f"{', '.join(counts)} poses of a frame"
 
 
