@@ -145,9 +145,8 @@ class SilhouetteCost:
                     f"mask must have shape {size}, the camera's,"
                     f" got {silhouette.mask.shape}"
                 )
-        if not self.blank and not any(
-            silhouette.mask.any() for silhouette in self.silhouettes
-        ):
+        shown = any(silhouette.mask.any() for silhouette in self.silhouettes)
+        if not self.blank and not shown:
             raise InputError("silhouettes must show a person, got an empty mask")
         check_square(self.cameras)
         between("beta", self.beta, 0.0, 1.0)

@@ -85,7 +85,6 @@ def starts_in(
             cost.coarser(factor)(poses) + INFEASIBLE_COST * ~space.feasible(poses)
         )
     least = min(float(each.min()) for each in costs)
-
     spread = np.full(space.dimensions, MODE_SPREAD)
     velocity = np.zeros(space.dimensions)
     starts = []

@@ -55,7 +55,7 @@ NAMES = {
 for _bone, _name in _LIMBS.items():
     NAMES[f"l{_bone}"] = f"Left{_name}"
     NAMES[f"r{_bone}"] = f"Right{_name}"
-# the conversions spell these two in another way
+# the conversions spell these two with their sides as one letter
 NAMES["lhipjoint"] = "LHipJoint"
 NAMES["rhipjoint"] = "RHipJoint"
 ROTATIONS = "Zrotation Xrotation Yrotation"

@@ -26,9 +26,9 @@ KINDS = ("K", "dist", "Rot", "R", "T", "H", "W", "ccm")
 
 
 def _recognises(stored: Stored) -> bool:
-    return "names" in stored.values and any(
-        key.startswith(("K_", "Rot_")) for key in stored.values
-    )
+    if "names" not in stored.values:
+        return False
+    return any(key.startswith(("K_", "Rot_")) for key in stored.values)
 
 
 def _read(file: Stored) -> list[Calibration]:
