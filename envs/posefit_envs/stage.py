@@ -254,6 +254,7 @@ class Stage:
     def _set(self, rows: int | Rows, scenes: SceneRow, axis: int) -> None:
         self._has_body[rows] = False
         _write(self._columns, rows, scenes)
+        # bits are unpacked once for each scene, not for each of its pictures
         pixels = np.unpackbits(scenes.masks, axis=axis, count=self._width)
         self._backdrops[rows] = np.multiply(pixels, OBSERVED, dtype=np.uint16)
 
@@ -304,6 +305,7 @@ class Stage:
         The pictures of the other rows show no body.
         """
         poses, translations = self.decode(proposals[:, None], rows)
+        # bodies are painted over the copy, and the next proposals need a clean one
         pictures = self._backdrops.copy()
         costs, areas = self._drawn(poses, translations, rows, pictures)
         drawn_poses = poses[:, 0]

@@ -279,6 +279,7 @@ class TrackVectorEnv(SearchVectorEnv):
         self._costs = drawn.costs
         rewards = reward_of_cost(drawn.costs)
         infos = proposal_infos(self.stage, drawn, self.world.shows_truth)
+        # before poses are committed: the counts are of the frames of the proposals
         self._count(infos)
         full = stepping & (problems.evaluations >= self.evaluations_per_frame)
         terminated, committed = self._commit(np.flatnonzero(full), drawn.pictures)
@@ -336,6 +337,7 @@ class TrackVectorEnv(SearchVectorEnv):
 
     def _frames(self) -> Rows:
         """Return the current frame (n,) of each environment."""
+        # after the last frame an episode stays in it
         frames = [self._sequences[i].frame for i in range(self.num_envs)]
         return np.minimum(frames, self.frames - 1)
 

@@ -80,6 +80,7 @@ def sweep(
         tally = command.swept(cells, out, start(), tell, shard=shard, **how)
     print_result(command.tally_lines(tally, out), {"out": out, **vars(tally)}, as_json)
     context = click.get_current_context()
+    # what a shell reports for a program that Ctrl-C has ended
     if tally.stopped:
         context.exit(130)
     context.exit(1 if tally.quarantined else 0)

@@ -134,6 +134,7 @@ def _p_values(means: Array, spreads: Array, blocks: int) -> Array:
 
     Without spread it is 0, or 1 if the mean difference is 0 as well.
     """
+    # pairs without spread divide by 0, and get their p in the last line
     with np.errstate(divide="ignore", invalid="ignore"):
         t = np.abs(means) * math.sqrt(blocks) / spreads
     p = 2.0 * stats.t.sf(t, blocks - 1)
@@ -142,6 +143,7 @@ def _p_values(means: Array, spreads: Array, blocks: int) -> Array:
 
 def _blocks_needed(means: Array, spreads: Array) -> Array:
     """Return how many blocks would show each difference (pairs,)."""
+    # Bonferroni's level, which Holm's method has for the lowest p
     level = SIGNIFICANCE / len(means)
     reach = stats.norm.ppf(1.0 - level / 2.0) + stats.norm.ppf(POWER)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -172,5 +174,6 @@ def _accumulated(p_values: Array) -> Array:
     order = np.argsort(p_values, kind="stable")
     factors = np.arange(len(p_values), 0, -1)
     products = np.empty_like(p_values)
+    # an adjusted p-value is never below that of a clearer difference
     products[order] = np.maximum.accumulate(p_values[order] * factors)
     return products

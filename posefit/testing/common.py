@@ -135,6 +135,7 @@ def nonsense_settings(case: PluginCase, *, harmless: bool = False) -> str:
         elif kind is float:
             nonsense = float("nan")
         else:
+            # of other types, no value is nonsense for every plugin
             continue
         tried += 1
         try:

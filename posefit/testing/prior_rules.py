@@ -166,6 +166,7 @@ def training_in_range(case: Case) -> None:
     """The training poses lie within the range."""
     prior = case.fitted
     latents = np.asarray(prior.transform(walking_angles()))
+    # rounding may put the poses at the ends of the range just outside
     slack = 1e-9 * (1.0 + np.abs(latents).max())
     out = (latents < np.asarray(prior.low) - slack) | (
         latents > np.asarray(prior.high) + slack
@@ -203,6 +204,7 @@ def same_bits(case: Case) -> None:
     latents = case.latents
     whole = prior.inverse_transform(latents)
     feasible = prior.feasible(latents)
+    # the first row alone, some rows, and all of them in reverse
     for rows in (slice(0, 1), slice(3, 10), slice(None, None, -1)):
         same = np.array_equal(prior.inverse_transform(latents[rows]), whole[rows])
         expect(
@@ -297,6 +299,7 @@ def searchable(case: Case) -> str:
     )
     uniform = np.random.default_rng(0).uniform(-1.0, 1.0, (2000, space.dimensions))
     share = space.feasible(uniform).mean()
+    # the share of proposals that are infeasible in every redraw
     copies = (1.0 - share) ** REDRAWS
     text = f"{100 * share:.3g} % of the box is feasible"
     if copies <= MAX_COPIES:
