@@ -16,7 +16,7 @@ from posefit.arrays import Array, writeable
 from posefit.fitting import contour_kernels as kernels
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.body import Body
-from posefit.geometry.camera import Camera
+from posefit.geometry.camera import Camera, stacked
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, Skeleton
 from posefit.silhouette.drawn import count_poses
 from posefit.silhouette.mask import (
@@ -323,14 +323,14 @@ def fitted(
     places = writeable(start[1].copy())
     count_poses(STEP_EVALUATIONS * len(views) * len(poses) * len(scales))
     targets = np.concatenate([start[1], means], axis=1)[:, free]
-    stacked = _stacked(views)
+    borders = _of_one_frame(views)
     reaches = np.array(scales, dtype=np.float64)
 
     def fit(part: slice) -> None:
         kernels.fit_poses(
             body.skeleton.chain,
             body.radii,
-            stacked,
+            borders,
             kernels.Pulls(free, targets[part], precisions[free]),
             reaches,
             MAX_ANGLE_STEP,
@@ -342,19 +342,15 @@ def fitted(
     return poses, places
 
 
-def _stacked(views: Sequence[MaskContours]) -> kernels.Views:
+def _of_one_frame(views: Sequence[MaskContours]) -> kernels.Views:
     """Return the borders of one frame's masks in the form that `fit_poses` takes."""
-    cameras = [view.camera for view in views]
     size = np.max([view.fields.shape[1:] for view in views], axis=0)
     fields = np.zeros((len(views), *size), dtype=np.float32)
     for whole, view in zip(fields, views, strict=True):
         part = view.fields[0]
         whole[: part.shape[0], : part.shape[1]] = part
     return kernels.Views(
-        np.array([camera.rotation for camera in cameras]),
-        np.array([camera.translation for camera in cameras]),
-        np.array([camera.focal for camera in cameras]),
-        np.array([camera.centre for camera in cameras]),
+        *stacked([view.camera for view in views]),
         fields,
         np.concatenate([view.corners for view in views]),
         np.concatenate([view.sizes for view in views]),
