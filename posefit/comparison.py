@@ -70,7 +70,7 @@ class Comparison:
             return ledger.frame()
 
     def report(self, path: str | Path) -> dict[str, Any]:
-        """Write the report as one page.
+        """Write the report as one page, and return its data.
 
         Args:
             path: The page, a file that ends in .html.

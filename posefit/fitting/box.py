@@ -383,9 +383,9 @@ def repair(space: Space, proposals: Array, home: Array) -> Array:
         >>> import numpy as np
         >>> from posefit.plugin import repair
         >>> from posefit.testing.toy import Toy
-        >>> proposals = np.array([[0.5, 0.5]])
+        >>> proposals = np.array([[0.5, 0.5], [1.5, 0.5]])
         >>> repair(Toy(2), proposals, np.zeros(2)).tolist()
-        [[0.5, 0.5]]
+        [[0.5, 0.5], [1.0, 0.5]]
     """
     repaired = np.clip(wrap(space, np.asarray(proposals, dtype=np.float64)), -1.0, 1.0)
     repaired = np.where(np.isfinite(repaired), repaired, home)

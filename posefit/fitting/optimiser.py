@@ -14,7 +14,9 @@ WORST = 1e15  # few libraries work with nan, infinity or the square of 1e300
 
 
 class Optimiser(Protocol):
-    """Proposes populations and learns their costs; nothing to inherit.
+    """Proposes populations and learns their costs.
+
+    A class need not inherit from it: these two methods make it an optimiser.
 
     Example:
         >>> import numpy as np
@@ -110,6 +112,9 @@ def check_tell(waiting: int, proposals: Array, costs: Array) -> None:
         >>> import numpy as np
         >>> from posefit.plugin import check_tell
         >>> check_tell(2, np.zeros((2, 9)), np.zeros(2))
+        >>> check_tell(2, np.zeros((2, 9)), np.zeros(3))
+        Traceback (most recent call last):
+        posefit.errors.InputError: ...
     """
     if not waiting:
         raise InputError("tell must follow ask, got costs before proposals")

@@ -62,11 +62,14 @@ class Prior(Latents, Protocol):
     """
 
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
-        """Learn from joint angles, and return itself.
+        """Learn from joint angles, and return the prior itself.
 
         Args:
-            angles: (T, 63) radians.
+            angles: The joint angles (T, 63) in radians.
             skeleton: The person's skeleton.
+
+        Returns:
+            The prior, now fitted.
 
         """
         ...

@@ -52,12 +52,12 @@ class BudgetSpentError(Exception):
 def minimise(
     problem: "Problem", optimiser: Optimiser, *, budget_known: bool = False
 ) -> "Problem":
-    """Let an optimiser use the budget of a problem, and return the problem.
+    """Minimise a problem with an optimiser, and return the problem.
 
-    The search ends when the optimiser proposes nothing, or a population larger than the
-    rest of the budget, which is not evaluated. A warning tells if the optimiser ends
-    before half of the budget is used, unless it was built with the budget
-    (`budget_known`), which some schedules follow.
+    The search ends when the optimiser proposes nothing, or when its next population
+    exceeds the rest of the budget; this population is not evaluated. If the optimiser
+    stops before half of the budget is used, a warning is given, because its schedule
+    may not know the budget. `budget_known` says that it does.
 
     Args:
         problem: what to minimise; it must have a budget.
@@ -72,15 +72,15 @@ def minimise(
         InputError: the problem has no budget, the optimiser proposed nothing, or no
             cost was a finite number.
 
-    >>> import numpy as np
-    >>> from posefit import optimiser, suite
-    >>> problem = suite(
-    ...     "posefit-2026.3", function=1, instance=17, dimension=9, budget=200
-    ... )
-    >>> cma = optimiser("cma")(problem.space, np.random.default_rng(0))
-    >>> minimise(problem, cma).evaluations
-    200
-
+    Example:
+        >>> import numpy as np
+        >>> from posefit import minimise, optimiser, suite
+        >>> problem = suite(
+        ...     "posefit-2026.3", function=1, instance=17, dimension=9, budget=200
+        ... )
+        >>> cma = optimiser("cma")(problem.space, np.random.default_rng(0))
+        >>> minimise(problem, cma).evaluations
+        200
     """
     if problem.budget is None:
         raise InputError(f"{problem.id} must have a budget to be minimised, got none")
@@ -119,6 +119,10 @@ class Problem:
     Call it with proposals (n, d) for their costs (n,), or with one proposal (d,) for a
     float. Every proposal counts as one evaluation, whether it is feasible or not.
 
+    A problem also has the attributes of its cost function, such as `problem.decode` in
+    a frame and `problem.look` in a suite. Attributes that COCO's problems have, too,
+    have the same names here.
+
     Args:
         cost: returns the costs (n,) of proposals (n, d).
         space: the box, as an optimiser knows it.
@@ -128,21 +132,21 @@ class Problem:
         noisy: returns the noisy costs (n,) that a call returns, from the proposals
             (n, d) and the number of evaluations before them. By default a call returns
             `cost`. The best and the trace are always of `cost`.
-        targets: costs to be reached, falling.
+        targets: costs to be reached, in descending order.
         id: names the problem in messages.
 
-    A problem also has the attributes of its cost function, such as `problem.decode` in
-    a frame and `problem.look` in a suite. Attributes have the same names as in COCO's
-    problems, if these have them.
+    Raises:
+        InputError: the budget is not a whole number above 0.
 
-    >>> import numpy as np
-    >>> from posefit.testing.toy import Toy, sphere
-    >>> problem = Problem(sphere, Toy(2), budget=3)
-    >>> problem(np.array([[0.3, 0.3], [1.0, 0.3]])).round(6).tolist()
-    [0.0, 12.25]
-    >>> problem.best.tolist(), problem.best_cost, problem.evaluations
-    ([0.3, 0.3], 0.0, 2)
-
+    Example:
+        >>> import numpy as np
+        >>> from posefit import Problem
+        >>> from posefit.testing.toy import Toy, sphere
+        >>> problem = Problem(sphere, Toy(2), budget=3)
+        >>> problem(np.array([[0.3, 0.3], [1.0, 0.3]])).round(6).tolist()
+        [0.0, 12.25]
+        >>> problem.best.tolist(), problem.best_cost, problem.evaluations
+        ([0.3, 0.3], 0.0, 2)
     """
 
     number_of_objectives = 1

@@ -40,6 +40,10 @@ class Camera:
         rotation: The rotation (3, 3) from the world to the camera.
         translation: The translation (3,) in metres.
 
+    Raises:
+        InputError: A size, focal length or shape is wrong, or `rotation` is not a
+            rotation.
+
     Example:
         >>> from posefit import Camera
         >>> camera = Camera.pinhole(640, 480, fx=700)

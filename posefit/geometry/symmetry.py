@@ -142,6 +142,9 @@ def exchanged_limbs(skeleton: Skeleton, poses: Array, limbs: Limbs) -> Array:
     Returns:
         The poses (n, 66) with exchanged limbs.
 
+    Raises:
+        InputError: `limbs` is neither "legs" nor "arms".
+
     Example:
         >>> import numpy as np
         >>> from posefit import exchanged_limbs, load_motion

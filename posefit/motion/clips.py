@@ -136,12 +136,12 @@ def load_motion(
         fps: frames per second.
         stated: information that the file lacks.
 
+    Returns:
+        The motion.
+
     Raises:
         InputError: there is no such motion, or unit or up is given for a source that is
             not a file.
-
-    Returns:
-        The motion.
 
     Example:
         >>> from posefit import load_motion

@@ -92,7 +92,7 @@ class Segmenter(Protocol):
     """
 
     def segment(self, image: Image) -> tuple[Mask, Mask]:
-        """Find the person in an image.
+        """Return the mask of the person in an image, and that of shadow.
 
         Args:
             image: (height, width, 3) uint8.
