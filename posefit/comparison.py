@@ -166,7 +166,7 @@ def compare(
     if factories and folder.exists():
         names = ", ".join(factories)
         say(
-            f"cells of {names} run again, although {folder} may hold them: "
+            f"cells of {names} run again, although {folder} may contain them: "
             "only rows of registered methods are reused"
         )
     try:

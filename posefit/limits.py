@@ -44,7 +44,7 @@ class _OvertimeError(BaseException):
 class timed:  # noqa: N801, named like the context managers of contextlib
     """Raise TimeoutError if the body of a `with` runs longer than `limit` seconds.
 
-    None is no limit. A limit needs an operating system with timers, and a body that
+    None sets no limit. A limit needs an operating system with timers, and a body that
     runs Python in the main thread. Elsewhere, and inside a call of compiled code that
     does not return, there is no limit. An earlier limit of a caller holds as well, and
     continues afterwards.

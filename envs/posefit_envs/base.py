@@ -608,7 +608,7 @@ def checked_mask(mask: Any, count: int) -> Flags:
         )
     if not mask.any():
         raise ArgumentError(
-            f"`options['reset_mask']` must hold at least one True, got {mask}"
+            f"`options['reset_mask']` must contain at least one True, got {mask}"
         )
     return mask.copy()
 

@@ -37,9 +37,9 @@ class Corrections(Wrapper):
     its silhouette differs, and adds the action to it.
 
     Actions are corrections in [-1, 1]^d. The first is the first proposal itself. Later
-    ones are 0.3 half-ranges of the box at most, and half as far after each correction
-    that made the cost no better. Proposals are clipped to the box; an unknown yaw goes
-    round instead.
+    ones are multiplied by 0.3 half-ranges of the box, and by a half for each correction
+    since the best proposal, so that steps shrink while nothing improves. Proposals are
+    clipped to the box; an unknown yaw wraps around instead.
 
     Observations have 2 p + d + 2 numbers of -1 to 1:
 
@@ -49,7 +49,7 @@ class Corrections(Wrapper):
     | p | the same, less the silhouette of the best proposal |
     | d | the best proposal; zeros before the first |
     | 1 | 1 before the first proposal, else 0 |
-    | 1 | corrections in vain since the best proposal, 0 to 4, / 4 |
+    | 1 | corrections since the best proposal, 0 to 4, / 4 |
 
     Infos and rewards are the environment's, and so are its problems: `best` of each is
     the best proposal.
@@ -177,7 +177,7 @@ def features(
         drawn: The silhouettes of the best proposals (n, p); zeros before the first.
         best: The best proposals (n, d).
         first: Which rows (n,) have no proposal yet.
-        failures: Corrections (n,) in vain.
+        failures: The corrections (n,) since the best proposals.
     """
     shown_failures = np.minimum(failures, MOST_FAILURES) / MOST_FAILURES
     seen = [

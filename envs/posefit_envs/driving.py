@@ -294,7 +294,7 @@ def _stepwise(problem: Problem, optimiser: Optimiser) -> Generator[Array, float,
         optimiser.tell(proposals, costs)
     if not problem.evaluations:
         raise error.Error(
-            f"evaluations must hold one population of {len(proposals)}, "
+            f"evaluations must be at least {len(proposals)}, one population, "
             f"got {problem.budget}"
         )
 

@@ -252,8 +252,8 @@ class RaceEnv(SearchEnv):
     | 0 to searches - 1 | this search runs its next generation |
     | searches | the search with the highest best cost is replaced by a new one |
 
-    The first generation of a new search is its first population. Actions outside are
-    clipped, with one warning.
+    The first generation of a new search is its first population. Actions outside the
+    box are clipped, with one warning.
 
     ## Observation Space
     `Box(0, 1, (4 searches + 3,), float32)`, with k searches:

@@ -70,7 +70,7 @@ def track(
     if live is not None:
         return _track_live(live, as_json, options, shown)
 
-    # plugins may print, and stdout must hold nothing but the JSON object
+    # plugins may print, and stdout must contain nothing but the JSON object
     with results_alone() if as_json else nullcontext():
         result = run(progress=shown, **_arguments(options))
     shown.log(f"took {_times(shown)}")

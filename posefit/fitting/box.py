@@ -103,7 +103,7 @@ def wrap(space: Space, proposals: Array) -> Array:
 
 
 def displacement(space: Space, origin: Array, target: Array) -> Array:
-    """Return target - origin (..., d), the short way round in periodic coordinates.
+    """Return target - origin (..., d), the shorter way in periodic coordinates.
 
     Args:
         space: The space, for its periodic coordinates.
@@ -175,7 +175,7 @@ def draw_population(space: Space, rng: np.random.Generator, count: int) -> Array
         The proposals (count, d).
 
     Raises:
-        InputError: Nothing is feasible, or the count is no whole number above 0.
+        InputError: Nothing is feasible, or the count is not a whole number above 0.
 
     Example:
         >>> import numpy as np

@@ -130,7 +130,7 @@ class Tilt:
         Args:
             prior: The fitted prior.
             motions: The motions.
-            share: The range holds this share of the residuals of each angle.
+            share: The range contains this share of the residuals of each angle.
             margin: Radians added to the range on either side.
 
         """

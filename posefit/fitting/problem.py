@@ -33,7 +33,7 @@ Cost = Callable[[Array], Array]
 
 
 class BudgetError(InputError):
-    """A budget does not hold one population."""
+    """A budget is smaller than one population."""
 
 
 class BudgetSpentError(Exception):
@@ -68,7 +68,7 @@ def minimise(
         The same problem: `problem.best`, `problem.best_cost`, `problem.trace`.
 
     Raises:
-        BudgetError: the budget does not hold the first population.
+        BudgetError: the budget is smaller than the first population.
         InputError: the problem has no budget, the optimiser proposed nothing, or no
             cost was a finite number.
 
@@ -95,7 +95,7 @@ def minimise(
         raise InputError("the optimiser must propose a population, got an empty one")
     if not used:
         raise BudgetError(
-            f"evaluations must hold one population of {len(proposals)}, "
+            f"evaluations must be at least {len(proposals)}, one population, "
             f"got {problem.remaining_evaluations:.0f}"
         )
     if not np.isfinite(problem.best_cost):
@@ -192,7 +192,7 @@ class Problem:
         Raises:
             ValueError: the shape is wrong, or a number is not finite. Nothing is
                 counted.
-            BudgetSpentError: the budget does not hold all proposals. Nothing is
+            BudgetSpentError: there are more proposals than evaluations left. Nothing is
                 evaluated.
 
         """
@@ -274,8 +274,8 @@ class Problem:
         """
         if not self._falls:
             raise InputError(
-                f"{self.id} must have been evaluated,"
-                f" got {self.evaluations} evaluations and no cost"
+                f"{self.id} must have a finite cost before it has a best proposal,"
+                f" got none in {self.evaluations} evaluations"
             )
         return self._falls[-1][2].copy()
 

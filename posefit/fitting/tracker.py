@@ -655,7 +655,7 @@ def _frame(
     If several modes were searched, they are its posterior.
     """
     poses, translations = best.decode(best.best[None])
-    # rasterising the result again is no evaluation
+    # rasterising the result again is not an evaluation
     with uncounted():
         areas = best.cost_and_areas(poses, translations)[1][:, 0]
     evaluations = guess_evaluations

@@ -46,7 +46,7 @@ def extract(
 ) -> dict[str, Any]:
     """Write the masks of one person to a new folder, with a preview and a report.
 
-    masks.npz holds `masks` and `valid` (T, height, width), `usable` (T,), `first`, the
+    masks.npz has `masks` and `valid` (T, height, width), `usable` (T,), `first`, the
     number of the first frame, `fps` if it is known, and `landmarks` (T, 27, 3) if the
     segmenter reports any, see `Segmenter`. quality.csv compares the masks of a film
     with its pictures. Several cameras are written to the folders 1, 2 and so on.

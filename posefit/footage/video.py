@@ -384,7 +384,7 @@ def _bytes_of(size: tuple[int, int]) -> int:
 def _kept_at_first(head: _Head, size: tuple[int, int]) -> Container[int]:
     """Return the frames to keep when the file is opened: all that it states, or none.
 
-    Of a film that is too long, only frames that are needed later are worth the room.
+    If a film is too long, only frames that are needed later are kept.
     """
     fits = 0.0 < head.claimed * _bytes_of(size) <= ROOM
     return range(round(head.claimed)) if fits else ()

@@ -208,7 +208,7 @@ class Camera:
         across = (np.abs(x) + radii) / free[0]  # (n,) metres of depth that are needed
         down = (np.abs(y) + radii) / free[1]
         needed = np.maximum(across, down) - z
-        # every ball stays at least half a metre before the camera
+        # every ball is at least half a metre in front of the camera
         clear = (radii - z).max() + 0.5
         return cls.around(target, azimuth, float(max(needed.max(), clear)), size)
 
@@ -230,8 +230,8 @@ class Camera:
     def squared(self) -> "Camera":
         """Return a camera of the same view with square pixels: this one if it has them.
 
-        The longer focal length holds in both directions, so that pictures get more
-        columns or more rows.
+        Both directions get the longer focal length, so that pictures have more columns
+        or more rows.
         """
         if self.square:
             return self

@@ -137,7 +137,7 @@ def _limits(bones: dict[str, _Bone]) -> Array | None:
 
 
 def _sections(path: Path) -> dict[str, list[Line]]:
-    """Return the lines of each section. The first line holds the section's name."""
+    """Return the lines of each section. The first line contains the section's name."""
     sections: dict[str, list[Line]] = {}
     current: list[Line] | None = None
     for line in lines_of(path, SIZE_LIMIT):

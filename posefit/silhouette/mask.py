@@ -19,8 +19,8 @@ from posefit.silhouette.spans import STRIP_PIXELS
 Mask = NDArray[np.bool_]  # (height, width)
 Areas = NDArray[np.int64]  # (..., 3): R, B, Y
 
-# share of the largest piece's pixels: the person's extent leaves out smaller pieces.
-# The value is from no paper.
+# Share of the largest piece's pixels: the person's extent leaves out smaller pieces.
+# The value is ours.
 MIN_PIECE_PIXELS = 0.06
 
 

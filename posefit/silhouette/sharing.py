@@ -88,7 +88,7 @@ def work_through(
                 taken = take(part)
             work(part, *taken)
 
-    # in a copy of this thread's context, which holds the count of drawn poses
+    # in a copy of this thread's context, which contains the count of drawn poses
     others = []
     for _ in range(min(threads, len(parts)) - 1):
         others.append(_pool(threads).submit(copy_context().run, take_turns))

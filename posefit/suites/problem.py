@@ -3,7 +3,7 @@
 Each is a `posefit.Problem` with a `SuiteCost` as its cost function. Its attributes have
 the same names as in COCO, so loops written for COCO run on it unchanged.
 
-A suite may get more problems. Everything else about it stays the same for ever.
+A suite may get more problems. Everything else about it never changes.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -272,7 +272,7 @@ class Suite:
                 self._addresses.append(address)
         if not self._addresses:
             raise InputError(
-                "a suite must hold at least one problem, "
+                "a suite must contain at least one problem, "
                 f"got none in {list(dimensions)} dimensions"
             )
 
@@ -312,5 +312,5 @@ def _numbers(what: str, numbers: object) -> list[int]:
     # a generator yields them only once
     listed = list(numbers)
     if not listed:
-        raise InputError(f"{what} must hold at least one number, got none")
+        raise InputError(f"{what} must contain at least one number, got none")
     return listed

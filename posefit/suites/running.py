@@ -258,7 +258,7 @@ def suite_scores(runs: Iterable[SuiteRun]) -> list[SuiteScore]:
             key = run.dimension, function, method_name(run), run.budget, run.infeasible
             groups.setdefault(key, []).append(run)
     if not groups:
-        raise InputError("runs must be at least one, got none")
+        raise InputError("runs must contain at least one run, got none")
     functions_of: dict[int, set[int]] = {}
     for dimension, function, *_ in groups:
         functions_of.setdefault(dimension, set()).add(function)

@@ -179,7 +179,7 @@ class Ledger:
         having = [file.path for file in self._files if file.counts(key)]
         path, *_ = having or [self._files[0].path]
         reason = cut(text_of(error))
-        # a key of somebody else's ledger could hold a command of the shell
+        # a key of somebody else's ledger could contain a command of the shell
         if not KEY.fullmatch(key):
             return InputError(
                 f"{path}: the row and the key of cell {name} must be written by "

@@ -166,9 +166,9 @@ def _checks(
             labels.append(f"{plugin.name} ({plugin.distribution} {plugin.version})")
         theirs = ", ".join(labels)
         raise InputError(
-            f"{kind} {name!r} must be of one plugin, "
-            f"got that of {offer.distribution}, which is used, "
-            f"and that of {theirs}, which is left out: give it another name"
+            f"{kind} {name!r} must be registered by one plugin, "
+            f"got {offer.distribution}, which is used, "
+            f"and {theirs}, which is left out: give it another name"
         )
     settings = parse_texts(offer.name, offer.factory, texts)
     if kind == "prior" and settings:

@@ -41,7 +41,7 @@ from posefit.tracking.pipeline import track_scene
 from posefit.tracking.result import Fit, Track
 from posefit.version import __version__
 
-# the arguments of a track that are no fields of TrackOptions
+# the arguments of a track that are not fields of TrackOptions
 _ARGUMENTS = ("out", "force", "resume", "write", "progress")
 DOCSTRING_WIDTH = 84  # columns of a described option, 88 in an indented docstring
 # options that may name files, which are compared by content

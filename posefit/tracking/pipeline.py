@@ -180,7 +180,7 @@ def track_scene(
         scene = with_turns(result.scene, given.cameras)
         for guess in _added(scene.guesses, given.guesses):
             progress.log(guess)
-        # evaluating a track is no effort of the method
+        # evaluating a track is not part of the method's effort
         with progress.phase("evaluate"), uncounted():
             taken = clocks() - started.start + scene.reading_seconds
             seconds, cpu_seconds = taken.tolist()

@@ -160,7 +160,7 @@ def test_a_fit_takes_the_first_frame_as_filmed(
         sources if len(sources) > 1 else sources[0], camera=cameras, **chosen, **QUICK
     )
     assert fit.track.table["frame"].tolist() == [number]
-    assert fit.track.gait.why == "one frame is no walk"
+    assert fit.track.gait.why == "one frame is not a walk"
 
 
 def test_files_and_a_page_come_later_too(
