@@ -145,4 +145,4 @@ def tally_lines(tally: Tally, out: str) -> list[str]:
     if not tally.done:
         return [line]
     page = shlex.quote(f"{out.rstrip(os.sep)}.html")
-    return [line, f"results: posefit report {shlex.quote(out)} --out {page}"]
+    return [line, f"see the results: posefit report {shlex.quote(out)} --out {page}"]

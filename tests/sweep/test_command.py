@@ -45,7 +45,7 @@ def test_a_sweep_writes_a_ledger_and_the_same_command_has_nothing_left_to_do(
     out = tmp_path / "deep" / "out"
     first = run("sweep", plan, "--out", out, "--workers", 1)
     assert first.exit_code == 0, first.stderr
-    report = f"results: posefit report {out} --out {out}.html\n"
+    report = f"see the results: posefit report {out} --out {out}.html\n"
     assert (
         first.stdout == f"8 of 8 cells done, 8 of them now, written to {out}\n{report}"
     )
