@@ -51,8 +51,8 @@ def cleaned(
     inverted = _is_inverted(view)
     if inverted:
         warnings.append(
-            f"{view.name}: most of the border is marked, so that the masks seem "
-            "inverted: they are turned round"
+            f"{view.name}: the masks cover most of the picture's border, so they seem "
+            "to be inverted, and are inverted back"
         )
     if holes is None:
         holes = MAX_HOLE_AREA if count > 1 else MAX_HOLE_ALONE

@@ -98,7 +98,7 @@ def _interval_columns() -> list[Column]:
         coverage = replace(
             _share("coverage"),
             name=f"coverage.{level}",
-            label=f"{level} % interval contains",
+            label=f"within {level} % intervals",
         )
         width = replace(
             MEASURES["interval_mm"],

@@ -70,7 +70,7 @@ class SuiteCost:
         optimum: The lowest cost: 0 if the silhouette is of a pose of the box, or None
             if it is unknown.
         truth_cost: The cost of the true pose, which is feasible.
-        looked: Whether `look` was called, so that the method does not search blind.
+        looked: Whether `look` was called, so that the method has used the pictures.
     """
 
     def __init__(
@@ -129,7 +129,7 @@ class SuiteCost:
     def look(self) -> list[list[tuple[Camera, Mask]]]:
         """Return the cameras and masks of each frame.
 
-        A method that calls this does not search blind, and `looked` marks its run. If
+        A method that calls this uses the pictures, and `looked` marks its run. If
         the problem is noisy, the result has the first of its masks.
         """
         self.looked = True

@@ -202,7 +202,7 @@ class SuiteScore:
         budget: The most evaluations of a run.
         infeasible: The treatment of infeasible proposals, see
             `posefit.suites.problem.SuiteCost`.
-        looked: Whether the method read silhouettes instead of searching blind.
+        looked: Whether the method read silhouettes, and not only costs.
         runs: The number of runs.
         above: The median of the best costs above the true poses'. It is below 0 if
             searches find lower costs.

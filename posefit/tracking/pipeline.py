@@ -82,7 +82,7 @@ def with_notes(scene: Scene, training: Sequence[Motion]) -> Scene:
                 notes.append(note)
     if len(notes) > MAX_NOTES:
         more = len(notes) - MAX_NOTES
-        notes[MAX_NOTES:] = [f"and {more} more of files to learn from"]
+        notes[MAX_NOTES:] = [f"and {more} more about training files"]
     return replace(scene, warnings=[*scene.warnings, *notes])
 
 
@@ -322,7 +322,7 @@ def track_hypotheses(
             hypothesis = _resumed(hypothesis, frames, state)
             frames = list(hypothesis.frames)
             of_several = f" of {which}, {hypothesis.guess}" if total > 1 else ""
-            progress.log(f"going on from frame {done} of {count}{of_several}")
+            progress.log(f"continuing from frame {done} of {count}{of_several}")
             if _starts_over(method, frames):
                 progress.warn(
                     f"{method.name} starts over at frame {done}: the frames from there"

@@ -122,7 +122,7 @@ def test_the_films_of_each_layout(
             write_kth,
             "00sequences.txt",
             None,
-            "00sequences.txt: expected a file, got nothing of that name",
+            "00sequences.txt: no such file",
         ),
         (
             write_kth,

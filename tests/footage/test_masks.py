@@ -287,7 +287,7 @@ def test_inverted_masks_are_turned_round_with_a_warning(
     (warning,) = check(path, walk)[1]
     assert (
         warning
-        == f"{path}: most of the border is marked, so that the masks seem inverted: they are turned round"
+        == f"{path}: the masks cover most of the picture's border, so they seem to be inverted, and are inverted back"
     )
 
 

@@ -119,7 +119,7 @@ def test_quarantined_cells_are_run_again_on_request(plan: Path, tmp_path: Path) 
     again = run(*words, "--retry-quarantined")
     assert again.exit_code == 0, again.stderr
     assert "1 of 1 cells done, 1 of them now" in again.stdout
-    assert "1 cell is out of quarantine, to be tried again" in again.stderr
+    assert "1 quarantined cell is tried again" in again.stderr
 
 
 @each(

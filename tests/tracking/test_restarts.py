@@ -270,7 +270,7 @@ def test_interrupted_hypotheses_continue_at_the_last_frame(tmp_path: Path) -> No
         assert [line for line in log if line.startswith("track ")] == new
         going_on = (
             [
-                f"going on from frame {frames} of 3 of track {done + 1} of 3, {names[done]}"
+                f"continuing from frame {frames} of 3 of track {done + 1} of 3, {names[done]}"
             ]
             if frames
             else []
