@@ -91,7 +91,7 @@ def new_file(path: str | Path) -> AbstractContextManager[Path]:
 def replaced_file(path: str | Path, mark: bytes) -> AbstractContextManager[Path]:
     """Yield an empty file to write. On success it replaces an earlier file.
 
-    If the body fails, the earlier file stays.
+    If the `with` block raises, the earlier file is kept.
 
     Args:
         path: the file.

@@ -22,7 +22,7 @@ AGAIN = 1.0  # seconds between repeated interrupts, for code that swallowed the 
 PARENT_POLL_SECONDS = 0.5
 # seconds left of a timer that should have ended meanwhile; 0 would switch it off
 SOON = 1e-6
-# seconds until an alarm that came too early, before the body, is repeated
+# seconds until an alarm that arrived before the `with` block began is repeated
 EARLY = 1e-3
 # environment variable that `check_decoded` reads, and its default
 DECODED = "POSEFIT_DECODED_GIGABYTES"
@@ -126,7 +126,7 @@ def end_with_parent(parent: int, clean_up: Callable[[], None] | None = None) -> 
 def memory(gigabytes: float) -> Iterator[None]:
     """Limit this process' memory in the body, on systems with such limits.
 
-    Code that wants more gets a MemoryError.
+    Code that allocates more gets a MemoryError.
     """
     try:
         import resource

@@ -135,7 +135,7 @@ class Races:
         """
         before = self.problems.best_costs[rows]
         chosen = actions.argmax(axis=1)
-        # the last choice stands for no search yet: the worst one makes room
+        # the last choice is a new search, which replaces the worst one
         for k in np.flatnonzero(chosen == self.searches).tolist():
             row = int(rows[k])
             chosen[k] = self.costs[row].argmax()

@@ -83,7 +83,7 @@ def _spanned_compiled(first, stop):  # noqa: ARG001
 
 
 def floored(number):
-    """Return a number rounded down, in its own type; infinity stays infinity."""
+    """Return a number rounded down, in its own type; infinity is not changed."""
     return np.floor(number)
 
 
@@ -93,7 +93,7 @@ def _floored_compiled(number):  # noqa: ARG001
 
 
 def ceiled(number):
-    """Return a number rounded up, in its own type; infinity stays infinity."""
+    """Return a number rounded up, in its own type; infinity is not changed."""
     return np.ceil(number)
 
 

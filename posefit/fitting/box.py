@@ -310,7 +310,7 @@ def sample_normal(
 
     `spread` (d,) or (n, d) has the standard deviations. A coordinate outside the box is
     folded back into it, as at a mirror. An infeasible draw is redrawn at most 100
-    times, and then stays at its mean.
+    times, and then replaced by its mean.
 
     Args:
         space: The space.

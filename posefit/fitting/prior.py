@@ -164,8 +164,8 @@ class Tilt:
     def around(self, added: Array, reach: Array) -> tuple[Array, Array]:
         """Return the middle and the half sides (2,) of a box of residuals.
 
-        The box stays in the range, so that near an end of the range its middle is not
-        the last residual.
+        The box is within the range, so near an end of the range its middle is not the
+        last residual.
 
         Args:
             added: (2,) the last residual.

@@ -37,7 +37,7 @@ class BudgetError(InputError):
 
 
 class BudgetSpentError(Exception):
-    """A call goes beyond the evaluations of a problem's budget.
+    """A call needs more evaluations than a problem's budget has left.
 
     Example:
         >>> import numpy as np

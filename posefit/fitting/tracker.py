@@ -42,7 +42,7 @@ SPREAD = 1.0
 FLOOR = 0.05
 HISTORY_FRAMES = 3  # frames that a prediction looks back
 TILT_SHARE = 0.99  # ours: the search covers the tilts of this share of training poses
-TILT_MARGIN_DEGREES = 5.0  # ours: about the difference between people's ways to stand
+TILT_MARGIN_DEGREES = 5.0  # ours: about the difference between people who stand
 RELOCALISE_GAP = 5  # frames without the person, about a sixth of a second. Ours
 # Key in the details of a frame: the coordinates (d,) of its pose in the search space.
 COORDINATES = "coordinates"
@@ -160,7 +160,7 @@ class Task:
             Interpretation S4.
         fps: Frames per second.
         training: Motions to learn from. Their angles are expressed about the axes of
-            the body's skeleton; the rotations in space stay the same.
+            the body's skeleton; the rotations in space are the same.
         first_pose: The joint angles (63,) in the first frame, or None if unknown.
         modes: Guessed modes of the first frame with their weights, see
             `posefit.fitting.start`.
@@ -663,7 +663,7 @@ def _frame(
         for problem in problems:
             evaluations += problem.evaluations
     used, costs = best.trace
-    # the trace of the best search, as if it came after all others
+    # the trace of the best search, as if it had been the last
     trace = np.column_stack([used + (evaluations - best.evaluations), costs])
     return Frame(
         poses[0],

@@ -59,7 +59,7 @@ class Changes:
     def between(self, earlier: tuple[int, Image], now: tuple[int, Image]) -> Mask:
         """Return `changed_pixels` of two frames, given by their numbers and pictures.
 
-        A number stands for one picture only.
+        A number must always have the same picture.
         """
         frames = earlier[0], now[0]
         if self._changed is None or frames != self._frames:

@@ -402,7 +402,7 @@ def _moments(
         path: The file.
         filmed: Width and height of its frames.
         size: Width and height to which they are scaled.
-        kept: Gets the frames that it wants.
+        kept: Chooses and keeps frames.
 
     """
     times = list[float]()

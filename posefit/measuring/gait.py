@@ -3,8 +3,8 @@
 It also finds people who walk backwards. A step of a foot lasts from the other foot's
 strike to its own, a stride from one of its strikes to the next. A step or a stride
 counts if the feet strike in turn, if the person moves the way they face, and if every
-frame of it is known. If a person walks and stays in one place, as on a treadmill or
-in front of a camera that turns with them, only times count.
+frame of it is known. If a person walks in one place, as on a treadmill or in front of
+a camera that turns with them, only times count.
 """
 
 from collections.abc import Collection, Iterator, Sequence
@@ -35,7 +35,7 @@ RUNNING_FROUDE = 0.5  # the Froude number from which people run rather than walk
 MIN_STANCE_SHARE = 0.57
 # ours: standard deviation over mean of strides in one place; a dance's differ more
 MAX_UNEVEN = 0.1
-# ours: greater than MIN_STEPS_SHARE, because other motions stay in one place, too
+# ours: greater than MIN_STEPS_SHARE, because other motions are in one place, too
 MIN_STEPS_SHARE_IN_PLACE = 0.5
 IN_PLACE = (
     "the person stays in one place: on the spot, on a treadmill, "

@@ -170,7 +170,7 @@ def mean_intervals(
     freedoms = cluster_counts[:, None] - 1.0  # (strata, 1)
     parts = (freedoms + 1.0) / freedoms * squares / count**2  # (strata, rows)
     variance = parts.sum(axis=0)
-    # Satterthwaite's degrees of freedom; any number serves a row without variance
+    # Satterthwaite's degrees of freedom; any number will do for a row without variance
     weighed = (parts**2 / freedoms).sum(axis=0)
     freedom = np.divide(variance**2, weighed, out=np.ones(rows), where=weighed > 0.0)
     reach = stats.t.ppf(0.5 + level / 2.0, freedom) * np.sqrt(variance)

@@ -168,7 +168,7 @@ def fewest_blocks(comparisons: int) -> int:
 
 
 def holm(p_values: ArrayLike) -> Array:
-    """Return p-values (m,) adjusted so that one level serves all m. Holm, 1979."""
+    """Return p-values (m,) adjusted for m tests at one level. Holm, 1979."""
     return np.minimum(1.0, _accumulated(np.asarray(p_values, dtype=np.float64)))
 
 

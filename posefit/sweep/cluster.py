@@ -38,7 +38,7 @@ class Cluster:
 
     Raises:
         ImportError: The library distributed is not installed.
-        InputError: The scheduler does not answer in time, has no workers, or goes away;
+        InputError: The scheduler does not answer in time, has no workers, or is lost;
             or a worker has another build of posefit.
     """
 

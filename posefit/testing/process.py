@@ -115,7 +115,7 @@ def _messages(task: dict[str, Any]) -> tuple[list[dict[str, Any]], str]:
 
 
 def _check() -> None:
-    """Run the checks that standard input asks for, and end this process."""
+    """Run the checks that standard input describes, and end this process."""
     faulthandler.enable()
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
     # the plugin's prints must not mix with the messages

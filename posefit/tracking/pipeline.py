@@ -437,8 +437,8 @@ def _budget(
 def _passes(scene: Scene, method: Method, evaluations: int, smoothed: bool) -> int:
     """Return how often a film is tracked.
 
-    Several passes pay with several cameras: these show which of two poses is right, but
-    only once both are tried.
+    With several cameras, several passes are worthwhile: the cameras show which of two
+    poses is right, but only once both are tried.
     """
     if len(scene.cameras) == 1 or scene.count < SHORTEST or scene.truth is not None:
         return 1

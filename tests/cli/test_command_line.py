@@ -687,7 +687,7 @@ def test_names_from_outside_do_not_steer_the_terminal(
     ):
         assert len(error_of(*words)) < 400
     assert error_of("track", "a\x1b[31m\nb.amc").startswith(
-        r"posefit: a\x1b[31m\nb.amc: expected "
+        r"posefit: a\x1b[31m\nb.amc: no such file"
     )
 
 

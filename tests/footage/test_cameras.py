@@ -195,7 +195,7 @@ def test_a_camera_under_the_floor_is_doubted(tmp_path: Path) -> None:
         path.write_text(programs.opencv(tvec=tvec))
         scene = scene_of([masks], SourceOptions(camera=[path], height=1.7))
         said = [
-            guess for guess in scene.guesses if "is its translation its place" in guess
+            guess for guess in scene.guesses if "below the origin of the world" in guess
         ]
         assert bool(said) == doubted
 

@@ -167,7 +167,7 @@ def test_a_grid_crosses_the_settings_of_the_methods_that_have_them_and_a_variant
         ({"defaults": {"train": ["walk"]}}, "train must not contain the motion itself, got walk"),
         ({"defaults": {"settings": {"sapso.coling": 1}}}, "got 'coling'; did you mean 'cooling'"),
         ({"defaults": {"settings": {"sapso.cooling": "cold"}}}, "sapso.cooling must be float, got 'cold'"),
-        ({"defaults": {"settings": {"cma.sigma": 1}}}, "settings must be of the plan's methods, got 'cma.sigma', which none"),
+        ({"defaults": {"settings": {"cma.sigma": 1}}}, "settings must be settings of the plan's methods, got 'cma.sigma', which none"),
         ({"product": {**PRODUCT, "methods": [{"method": "sapso@pca", "settings": {"cma.sigma": 1}}]}}, "got 'cma.sigma'"),
         ({"grid": {"inertia": [0.7]}}, r'grid must contain settings .* such as "sapso.inertia" = \[0.7, 0.9\], got inertia ='),
         ({"grid": [1]}, r"grid must contain settings .*, got \[1\]"),

@@ -275,7 +275,7 @@ def test_interrupted_hypotheses_continue_at_the_last_frame(tmp_path: Path) -> No
             if frames
             else []
         )
-        assert [line for line in log if line.startswith("going on")] == going_on
+        assert [line for line in log if line.startswith("continuing")] == going_on
         costs = [
             [row["cost"] for row in track.summary["hypotheses"]]
             for track in (whole, resumed)

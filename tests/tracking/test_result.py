@@ -71,7 +71,7 @@ def test_the_same_masks_give_the_same_track(
         (np.zeros((2, 3, 4, 5), bool), "masks must have shape"),
         (np.zeros((2, 6, 8), bool), "a mask with a person"),
         ([np.zeros((6, 8)), np.zeros((8, 6))], "masks must have one shape"),
-        (["missing.png"], "missing.png: expected a file"),
+        (["missing.png"], "missing.png: no such file"),
         (
             np.moveaxis(MASKS, 0, 2),
             "must have shape .frames, height, width., got 3 as the width",

@@ -158,7 +158,7 @@ class _Part:
     visibility: Visibility
     spread: Array  # (17,) standard deviations of these logarithms
     cameras: Sequence[Camera]
-    # (V, 3) radians, the turn of the world in each camera; (0, 3) if cameras stay
+    # (V, 3) radians, the turn of the world in each camera; (0, 3) if none is turned
     turns: Array
 
 
