@@ -14,7 +14,7 @@ from types import FrameType
 from posefit.errors import InputError
 from posefit.reading import quoted
 
-SECONDS = 1e-3, 1e8  # range of a time limit that the timers of operating systems take
+SECONDS = 1e-3, 1e8  # range of a time limit that operating systems' timers accept
 GIGABYTES = 1e-3, 1e6
 RATES = 1e-3, 1e6  # frames per second
 HEIGHTS = 0.3, 2.8  # stature of a person, metres

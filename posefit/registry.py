@@ -222,7 +222,8 @@ class Registry:
     def hint(self, name: str, known: Iterable[str]) -> str:
         """Return the end of a message about an unknown name.
 
-        It names the name's kind, the nearest known name, or the command to ask.
+        It says of which other kind the name is, or gives the nearest known name or the
+        command that lists them.
         """
         kinds = [kind for kind, offers in self.offers.items() if name in offers]
         if kinds:

@@ -33,7 +33,7 @@ ROW, STOP, FIRST, LAST, TOP, BOUNDS = range(6)
 
 
 def on_device(function):
-    """Return a function that is compiled for CPUs, compiled for a device instead."""
+    """Return the version for a device of a function that is compiled for CPUs."""
     return cuda.jit(device=True)(getattr(function, "py_func", function))
 
 

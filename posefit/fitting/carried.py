@@ -96,7 +96,7 @@ def _fields(space: SearchSpace) -> dict[str, Any]:
 
 
 def _kept(value: Any, space: Any, rng: Any) -> Any:
-    """Return a value as plain values. Raises UnknownError if that is impossible."""
+    """Return a value in a plain form. Raises UnknownError if that is impossible."""
     if value is space:
         return {KIND: "space"}
     if value is rng:

@@ -106,7 +106,7 @@ def check_tell(waiting: int, proposals: Array, costs: Array) -> None:
         costs: The costs that `tell` got.
 
     Raises:
-        InputError: The shapes do not match, or nothing waits for costs.
+        InputError: The shapes do not match, or no proposals are waiting for costs.
 
     Example:
         >>> import numpy as np

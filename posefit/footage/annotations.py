@@ -280,7 +280,7 @@ class _Content:
 
 
 def _key(value: Any) -> Any:
-    """Return a whole number or a name, whatever else a file may have there."""
+    """Return a whole number or a name, or None for any other value of a file."""
     if isinstance(value, float) and value.is_integer():
         return int(value)
     return value if isinstance(value, int | str) else None

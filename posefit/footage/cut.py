@@ -1,4 +1,4 @@
-"""Refuse a film soon if the picture's border cuts the person in all of its frames.
+"""Refuse a film early if the picture's border cuts the person in all of its frames.
 
 `quality.verdict` refuses such a film, too, but only after all of its frames.
 """

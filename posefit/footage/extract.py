@@ -58,7 +58,7 @@ def extract(
         out: The folder, which must not exist.
         how: How to segment the person in a film.
         frames: First frame, and the frame after the last.
-        progress: Shows how far a film is.
+        progress: Shows the progress of each film.
 
     Returns:
         The summary; for several cameras, a list of summaries as `cameras`.

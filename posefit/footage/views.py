@@ -286,7 +286,7 @@ def known_planes(there: NDArray[np.bool_], size: tuple[int, int]) -> Planes | No
 
 
 def beyond(frames: Range, first: int, count: int) -> str:
-    """Return what to say if a range names frames that a source does not have, or "".
+    """Return a message if a range names frames that a source does not have, else "".
 
     Args:
         frames: The range, as for `span`.

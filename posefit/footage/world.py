@@ -128,8 +128,8 @@ def unit_by_height(
     """Return the unit in which the person's height is about right.
 
     Args:
-        measured: The person's height by the factor that the lengths of calibrations
-            with an open unit are multiplied with.
+        measured: Measures the person, given the factor by which the lengths of
+            calibrations with an open unit are multiplied.
         known: The cameras. A calibration may state that it is in metres, or that its
             unit may be any length if no usual one fits.
         metres: The unit guessed before, in metres.

@@ -74,9 +74,9 @@ def mirrored_poses(skeleton: Skeleton, poses: Array) -> Array:
 def turned_poses(poses: Array) -> Array:
     """Return poses (n, 66) that face the opposite way, with the same joint angles.
 
-    From the front or from behind, an upright body at rest keeps its outline. A walking
-    body nearly keeps it, with left and right on the other sides. From the side, knees
-    and feet point the wrong way.
+    From the front or from behind, the outline of an upright body at rest is the same.
+    That of a walking body is nearly the same, with left and right exchanged. From the
+    side, knees and feet point the wrong way.
 
     Args:
         poses: The poses (n, 66).

@@ -30,7 +30,7 @@ MIN_STEPS_SHARE = 1.0 / 3.0  # least share of the known time that the steps last
 # metres between the lines on which the feet of a walk strike; in dancing or dodging it
 # is wider
 MAX_STEP_WIDTH = 0.35
-RUNNING_FROUDE = 0.5  # the Froude number from which people run rather than walk
+RUNNING_FROUDE = 0.5  # the Froude number above which people run rather than walk
 # share of a stride; judged by the rearmost toes, a runner's stance is shorter
 MIN_STANCE_SHARE = 0.57
 # ours: standard deviation over mean of strides in one place; a dance's differ more

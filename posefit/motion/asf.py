@@ -90,7 +90,7 @@ def parse_asf(path: str | Path, unit: Unit | None = None) -> Acclaim:
         vectors.append(bones[name].vector)
         axes.append(bones[name].axis)
     channels = []
-    # of fingers, too: a motion's file has angles for them, and a pose has not
+    # of fingers, too: a motion's file has angles for them, and a pose has none
     for name, bone in bones.items():
         if bone.free:
             channels.append((name, bone.free))

@@ -41,7 +41,7 @@ _WRITTEN = (*FILES, RECORD, *CARRIED_FILES)
 
 
 class Recorder:
-    """Records the frames of a track as they come. This base class records nothing."""
+    """Records each frame of a track at once. This base class records nothing."""
 
     def __enter__(self) -> Self:
         return self

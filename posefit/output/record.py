@@ -1,4 +1,4 @@
-"""The record of a track's frames as they come: one line per frame, with a checksum.
+"""The record of a track's frames so far: one line per frame, with a checksum.
 
 An interrupted track is resumed from it.
 """

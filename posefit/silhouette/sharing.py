@@ -49,7 +49,7 @@ def parts_of(n: int, threads: int) -> tuple[slice, ...]:
 
 @lru_cache
 def shares_of(n: int, threads: int) -> tuple[slice, ...]:
-    """Return slices of n rows, each of which takes long: one a thread."""
+    """Return slices of n rows, one for each thread, if each row takes long."""
     return _equal_slices(n, max(min(threads, n), 1))
 
 

@@ -1,4 +1,4 @@
-"""Writes a ledger: plans cells, and notes what became of each."""
+"""Writes a ledger: plans cells, and records the outcome of each."""
 
 import json
 import os

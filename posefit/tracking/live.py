@@ -1,4 +1,4 @@
-"""Tracks a person in frames as they come: `posefit track --live`."""
+"""Tracks a person in frames as they arrive: `posefit track --live`."""
 
 import json
 import os

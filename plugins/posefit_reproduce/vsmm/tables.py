@@ -159,7 +159,7 @@ def switching_figures(labels: list[int], arrays: Arrays) -> dict[str, float]:
         # -1 means no candidate: the end of a switch, not an activation
         if now not in (-1, before):
             activated.append(models_of[now + 1] & wanted)
-    terminated = []  # whether the right models went out of force
+    terminated = []  # whether the right models are no longer in force
     for (before, now), wanted in zip(pairwise(in_force), right[1:], strict=True):
         terminated.append(bool(before & wanted) and not now & wanted)
     return {
