@@ -68,7 +68,7 @@ class _Compilation(event.Listener):  # type: ignore[misc]
         if event.data["dispatcher"].py_func.__module__.startswith("posefit"):
             self.announced = True
             logging.getLogger("posefit").warning(
-                "compiling the kernels, once on this machine; "
+                "compiling kernels for their first use on this machine; "
                 "this takes ten seconds or more ..."
             )
 

@@ -84,7 +84,7 @@ def _times(shown: Progress) -> str:
     phases = [f"{name} {seconds:.1f} s" for name, seconds in shown.phases.items()]
     compiling = compiling_seconds()
     if compiling:
-        phases.append(f"{compiling:.1f} s of this for compiling, once on this machine")
+        phases.append(f"{compiling:.1f} s of this for compiling kernels")
     return ", ".join(phases)
 
 
