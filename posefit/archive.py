@@ -33,7 +33,7 @@ _PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 
 class _RefusedError(InputError):
-    """The file holds something that is not read; the message says what."""
+    """The file contains something that is not read; the message says what."""
 
 
 @dataclass(frozen=True)

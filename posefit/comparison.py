@@ -70,7 +70,7 @@ class Comparison:
             return ledger.frame()
 
     def report(self, path: str | Path) -> dict[str, Any]:
-        """Write the report as one page.
+        """Write the report as one page, and return its data.
 
         Args:
             path: The page, a file that ends in .html.
@@ -166,7 +166,7 @@ def compare(
     if factories and folder.exists():
         names = ", ".join(factories)
         say(
-            f"cells of {names} run again, although {folder} may hold them: "
+            f"cells of {names} run again, although {folder} may contain them: "
             "only rows of registered methods are reused"
         )
     try:

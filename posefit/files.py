@@ -91,7 +91,7 @@ def new_file(path: str | Path) -> AbstractContextManager[Path]:
 def replaced_file(path: str | Path, mark: bytes) -> AbstractContextManager[Path]:
     """Yield an empty file to write. On success it replaces an earlier file.
 
-    If the body fails, the earlier file stays.
+    If the `with` block raises, the earlier file is kept.
 
     Args:
         path: the file.
@@ -181,7 +181,7 @@ class Unfinished:
 
     @classmethod
     def begin(cls, target: Path, info: Mapping[str, Any]) -> Self:
-        """Return a new folder with a mark that holds `info`.
+        """Return a new folder with a mark that contains `info`.
 
         Raises:
             OSError: the disk is full, or the folder cannot be created.
@@ -241,10 +241,10 @@ class Unfinished:
 
         Args:
             names: names of the result's files.
-            replace: whether to replace an earlier folder that holds only such files.
+            replace: whether to replace an earlier folder that contains only such files.
 
         Raises:
-            OSError: the earlier folder holds anything else, or a folder with the
+            OSError: the earlier folder contains anything else, or a folder with the
                 target's name has appeared meanwhile.
         """
         names = [*names, MARK]

@@ -85,7 +85,7 @@ def checkable(hint: Any) -> bool:
 
 
 def fitted(hint: Any, value: Any) -> Any:
-    """Return a value as a hint demands it: a list as a tuple, or the other way round.
+    """Return a value as a hint demands it: a list as a tuple, or a tuple as a list.
 
     Raises:
         UnfitError: the value does not fit, or the hint is not checkable.

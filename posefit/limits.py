@@ -14,7 +14,7 @@ from types import FrameType
 from posefit.errors import InputError
 from posefit.reading import quoted
 
-SECONDS = 1e-3, 1e8  # range of a time limit that the timers of operating systems take
+SECONDS = 1e-3, 1e8  # range of a time limit that operating systems' timers accept
 GIGABYTES = 1e-3, 1e6
 RATES = 1e-3, 1e6  # frames per second
 HEIGHTS = 0.3, 2.8  # stature of a person, metres
@@ -22,7 +22,7 @@ AGAIN = 1.0  # seconds between repeated interrupts, for code that swallowed the 
 PARENT_POLL_SECONDS = 0.5
 # seconds left of a timer that should have ended meanwhile; 0 would switch it off
 SOON = 1e-6
-# seconds until an alarm that came too early, before the body, is repeated
+# seconds until an alarm that arrived before the `with` block began is repeated
 EARLY = 1e-3
 # environment variable that `check_decoded` reads, and its default
 DECODED = "POSEFIT_DECODED_GIGABYTES"
@@ -44,7 +44,7 @@ class _OvertimeError(BaseException):
 class timed:  # noqa: N801, named like the context managers of contextlib
     """Raise TimeoutError if the body of a `with` runs longer than `limit` seconds.
 
-    None is no limit. A limit needs an operating system with timers, and a body that
+    None sets no limit. A limit needs an operating system with timers, and a body that
     runs Python in the main thread. Elsewhere, and inside a call of compiled code that
     does not return, there is no limit. An earlier limit of a caller holds as well, and
     continues afterwards.
@@ -126,7 +126,7 @@ def end_with_parent(parent: int, clean_up: Callable[[], None] | None = None) -> 
 def memory(gigabytes: float) -> Iterator[None]:
     """Limit this process' memory in the body, on systems with such limits.
 
-    Code that wants more gets a MemoryError.
+    Code that allocates more gets a MemoryError.
     """
     try:
         import resource

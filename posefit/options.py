@@ -105,7 +105,7 @@ def number_option(
 
 
 def is_whole(value: Any) -> bool:
-    """Return whether a value is a whole number, of Python or NumPy, and no boolean."""
+    """Return whether a value is a whole number, of Python or NumPy, but no boolean."""
     return isinstance(value, Integral) and not isinstance(value, bool)
 
 

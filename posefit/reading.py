@@ -76,8 +76,9 @@ def existing(path: Path) -> Path:
         InputError: it does not exist, or is an empty file.
     """
     if not path.exists():
-        expected = "a file" if path.suffix else "a file or a folder"
-        raise InputError(f"{path}: expected {expected}, got nothing of that name")
+        if path.suffix:
+            raise InputError(f"{path}: no such file")
+        raise InputError(f"{path}: no such file or folder")
     if path.is_file() and not path.stat().st_size:
         raise InputError(f"{path}: expected a file with content, got an empty one")
     return path

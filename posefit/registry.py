@@ -222,7 +222,8 @@ class Registry:
     def hint(self, name: str, known: Iterable[str]) -> str:
         """Return the end of a message about an unknown name.
 
-        It names the name's kind, the nearest known name, or the command to ask.
+        It says of which other kind the name is, or gives the nearest known name or the
+        command that lists them.
         """
         kinds = [kind for kind, offers in self.offers.items() if name in offers]
         if kinds:
@@ -309,15 +310,15 @@ def version_of(origins: Iterable[str]) -> str:
 def optimiser(name: str) -> "OptimiserFactory":
     """Return the factory of an installed optimiser.
 
-    Raises:
-        InputError: there is none; the message lists the known names.
-        ImportError: a library that it needs is not installed.
-
     Args:
         name: The optimiser's name, such as "sapso", or "nevergrad:DE".
 
     Returns:
         The factory, which takes a space, a generator and settings.
+
+    Raises:
+        InputError: There is no such optimiser; the message lists the known names.
+        ImportError: A library that it needs is not installed.
 
     Example:
         >>> import posefit
@@ -330,15 +331,15 @@ def optimiser(name: str) -> "OptimiserFactory":
 def prior(name: str) -> "PriorFactory":
     """Return the factory of an installed prior.
 
-    Raises:
-        InputError: there is none; the message lists the known names.
-        ImportError: a library that it needs is not installed.
-
     Args:
         name: The prior's name, such as "pca".
 
     Returns:
         The factory, which takes settings.
+
+    Raises:
+        InputError: There is no such prior; the message lists the known names.
+        ImportError: A library that it needs is not installed.
 
     Example:
         >>> import posefit

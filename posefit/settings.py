@@ -156,7 +156,7 @@ def planned(
     asked = filled.get("population_size")
     if isinstance(asked, int) and asked > evaluations:
         raise InputError(
-            f"evaluations must hold one population of {asked}, got {evaluations}"
+            f"evaluations must be at least {asked}, one population, got {evaluations}"
         )
     if "evaluations" in known:
         filled.setdefault("evaluations", evaluations)

@@ -37,12 +37,12 @@ REQUEST = {
         "",
         "coordinates of a proposal; null for a tracker that searches no box",
     ),
-    "settings": ("", "what was set, or follows from the budget"),
+    "settings": ("", "settings that were chosen or follow from the budget"),
 }
 
 # Columns of a sweep's row besides the figures, in the CSV's order: first the request.
 CELL = {
-    "key": ("", "the row's name: the SHA-256 of everything it depends on"),
+    "key": ("", "the row's name: the SHA-256 of everything on which it depends"),
     "version": ("", "versions of posefit and of the plugins that are not its own"),
     "status": ("", "`done`, or `quarantined` after three failed attempts"),
     "reason": ("", "why a quarantined cell failed"),
@@ -50,7 +50,7 @@ CELL = {
     "method": ("", "the optimiser and the prior, or the tracker"),
     "motion": ("", "the motion that was tracked"),
     "train": ("", "training motions"),
-    "settings": ("", "what was set, `NAME.SETTING=VALUE`"),
+    "settings": ("", "the chosen settings, as `NAME.SETTING=VALUE`"),
     "view_degrees": ("degrees", "directions of the cameras"),
     "corruption": ("", "kinds of damage to the masks, with their strengths"),
     "instance": ("", "number of the variation of the motion or the function"),
@@ -64,16 +64,16 @@ CELL = {
     "yaw_off_degrees": ("degrees", "largest error of the yaw given to the method"),
     "body_off_percent": ("%", "largest error of the body given to the method"),
     "seed": ("", "seed of all random numbers"),
-    "name": ("", "what reports call the method, if the plan says so"),
+    "name": ("", "the method's name in reports, if the plan gives one"),
 }
 SEARCH_CELL = {
     "suite": ("", "the numbered benchmark"),
     "function": ("", "the function's number"),
     "dimension": ("", "coordinates of the function"),
-    "infeasible": ("", "what becomes of a proposal outside the limits of a person"),
+    "infeasible": ("", "how infeasible proposals are treated"),
 }
 SPENT = {
-    "warnings": ("", "what to look at before the result is trusted"),
+    "warnings": ("", "what to check before you trust the result"),
     "evaluations_used": ("", MEASURES["evaluations"].meaning),
     "dimensions": ("", "coordinates of a proposal"),
     "joint_errors_mm.JOINT": (
@@ -99,9 +99,12 @@ LEADERBOARD = {
     "low": ("", "lower end of the 95 % interval of the first figure"),
     "high": ("", "upper end"),
     "behind": ("", "mean difference of paired runs from the method of the first row"),
-    "behind_low": ("", "lower end of its 95 % interval, adjusted as p is"),
+    "behind_low": ("", "lower end of its 95 % interval, adjusted in the same way as p"),
     "behind_high": ("", "upper end"),
-    "p": ("", "of that difference: a paired t test, after Holm over all pairs"),
+    "p": (
+        "",
+        "of that difference: a paired t test with Holm's correction over all pairs",
+    ),
     "blocks_needed": (
         "",
         "paired runs that would show that difference with a probability of 80 %",
@@ -137,7 +140,7 @@ RESULT = {
         "",
         "of a single frame: evaluations so far and best cost after each population",
     ),
-    "warnings": ("", "what to look at before the result is trusted"),
+    "warnings": ("", "what to check before you trust the result"),
     "guesses": ("", "what posefit assumed, such as the camera, the rate or a height"),
     "modes": (
         "",
@@ -182,10 +185,10 @@ def page() -> str:
         "The request comes first, then the results.",
         _table("key", _described(REQUEST)),
         _table("key", [*_measured(MEASURES.values()), *_described(RESULT)]),
-        "`error_degrees` holds `mean`, `std` and `max` over the frames. `skill`, "
+        "`error_degrees` contains `mean`, `std` and `max` over the frames. `skill`, "
         "`baselines_degrees` and "
-        f"`baselines_mm` hold one number for each baseline: {_baselines()}. "
-        "`coverage` and `interval_mm` hold one for each of `50`, `80` and `95`. A "
+        f"`baselines_mm` contain one number for each baseline: {_baselines()}. "
+        "`coverage` and `interval_mm` contain one for each of `50`, `80` and `95`. A "
         "figure is `null` if it needs an unknown truth, or if the method does not "
         "report it.",
         "## Columns of `frames.csv`",

@@ -77,7 +77,7 @@ def main(root: Path) -> None:
     files = sorted(root.glob("*.npz"), key=lambda path: int(path.stem))
     if not files:
         raise InputError(
-            f"CMU30_DIR must hold one .npz per subject, got {root} without any"
+            f"CMU30_DIR must contain one .npz per subject, got {root} without any"
         )
     skeletons: list[dict[str, Any]] = []
     names = []

@@ -260,7 +260,7 @@ def main(root: Path) -> None:
     ):
         if not (root / f"{clip.path}.amc").is_file():
             raise InputError(
-                f"CMU_DIR must hold {clip.path}.amc, got {root} without it"
+                f"CMU_DIR must contain {clip.path}.amc, got {root} without it"
             )
     for name, teaching in TEACHINGS.items():
         clips = [recorded(root, clip) for clip in teaching.fitted]

@@ -341,7 +341,7 @@ def main(root: Path) -> None:
     ]
     for name in needed:
         if not (root / name).is_file():
-            raise InputError(f"CMU_DIR must hold {name}, got {root} without it")
+            raise InputError(f"CMU_DIR must contain {name}, got {root} without it")
     bones = average(
         [parse_asf(root / subject / f"{subject}.asf").skeleton for subject in SUBJECTS]
     )

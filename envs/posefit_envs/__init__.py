@@ -7,9 +7,9 @@
     action = env.action_space.sample()
     observation, reward, terminated, truncated, info = env.step(action)
 
-`FitImage-v1` asks for the pose in one silhouette, within a few proposals. `Track-v1`
-follows a sequence of silhouettes. In `Race-v1` several searches share a budget, and
-each action chooses which one continues. Their docstrings are their manual.
+In `FitImage-v1` an agent has a few proposals to find the pose in one silhouette. In
+`Track-v1` it follows a sequence of silhouettes. In `Race-v1` several searches share a
+budget, and each action chooses which one continues. Their docstrings are their manual.
 
 Importing this package registers the environments; each module is imported when its
 environment is made. `drive` runs an optimiser against an environment or a vector of

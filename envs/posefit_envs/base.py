@@ -191,8 +191,8 @@ class SearchEnv(Env[Any, Any], ABC):
     def __getstate__(self) -> dict[str, Any]:
         """Return the state, with the problem as a plain dictionary.
 
-        A Problem refuses to be pickled alone, because its count of evaluations would be
-        lost. Here the whole environment is pickled, and the count goes along.
+        A Problem cannot be pickled alone, because its count of evaluations would be
+        lost. Here the whole environment is pickled, and with it the count.
         """
         return {**vars(self), "_problem": self._problem and vars(self._problem)}
 
@@ -428,8 +428,8 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         terminated = stepping & terminated
         truncated = stepping & (self.steps >= self._longest)
         self.ended = terminated | truncated
-        # a row has the infos of its step, unless a reset came instead of it (NEXT_STEP)
-        # or after it (SAME_STEP): then it has the infos of the reset
+        # a row has the infos of its step, unless a reset replaced it (NEXT_STEP) or
+        # followed it (SAME_STEP): then it has the infos of the reset
         going = stepping
         begun_infos: Infos = self.reset_infos() if not stepping.all() else {}
         final: Infos = {}
@@ -608,7 +608,7 @@ def checked_mask(mask: Any, count: int) -> Flags:
         )
     if not mask.any():
         raise ArgumentError(
-            f"`options['reset_mask']` must hold at least one True, got {mask}"
+            f"`options['reset_mask']` must contain at least one True, got {mask}"
         )
     return mask.copy()
 

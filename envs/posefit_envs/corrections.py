@@ -37,9 +37,9 @@ class Corrections(Wrapper):
     its silhouette differs, and adds the action to it.
 
     Actions are corrections in [-1, 1]^d. The first is the first proposal itself. Later
-    ones are 0.3 half-ranges of the box at most, and half as far after each correction
-    that made the cost no better. Proposals are clipped to the box; an unknown yaw goes
-    round instead.
+    ones are multiplied by 0.3 half-ranges of the box, and by a half for each correction
+    since the best proposal, so that steps shrink while nothing improves. Proposals are
+    clipped to the box; an unknown yaw wraps around instead.
 
     Observations have 2 p + d + 2 numbers of -1 to 1:
 
@@ -49,7 +49,7 @@ class Corrections(Wrapper):
     | p | the same, less the silhouette of the best proposal |
     | d | the best proposal; zeros before the first |
     | 1 | 1 before the first proposal, else 0 |
-    | 1 | corrections in vain since the best proposal, 0 to 4, / 4 |
+    | 1 | corrections since the best proposal, 0 to 4, / 4 |
 
     Infos and rewards are the environment's, and so are its problems: `best` of each is
     the best proposal.
@@ -107,14 +107,29 @@ class Corrections(Wrapper):
         seed: Any = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Features, Infos]:
-        """Begin episodes, with the options of the environment."""
+        """Return the first observations (n, 2 p + d + 2) of new episodes, and infos.
+
+        Args:
+            seed: Seed of the environment.
+            options: Options of the environment.
+
+        """
         pictures, infos = self.env.reset(seed=seed, options=options)
         everyone = np.ones(self.num_envs, dtype=bool)
         self._begin((options or {}).get("reset_mask", everyone), pictures)
         return self._observations(), infos
 
     def step(self, actions: Any) -> tuple[Features, Array, Flags, Flags, Infos]:
-        """Propose the best proposals, corrected."""
+        """Return what the environment returns for the best proposals, corrected.
+
+        Args:
+            actions: The corrections (n, d) in [-1, 1].
+
+        Returns:
+            Observations (n, 2 p + d + 2), rewards (n,), two flags (n,), terminated and
+            truncated, and infos.
+
+        """
         proposals = self.proposals(np.asarray(actions, dtype=np.float64))
         pictures, rewards, terminated, truncated, infos = self.env.step(proposals)
         begun = np.asarray(infos["evaluations"]) == 0
@@ -128,7 +143,7 @@ class Corrections(Wrapper):
         return self._observations(), rewards, terminated, truncated, infos
 
     def proposals(self, actions: Array) -> Array:
-        """Return the proposals (n, d) that actions (n, d) make."""
+        """Return the proposals (n, d) of actions (n, d), without a step."""
         first = np.isinf(self._best_costs)
         reach = np.where(first, 1.0, REACH * 0.5**self._failures)
         proposals = self._best + reach[:, None] * np.clip(actions, -1.0, 1.0)
@@ -138,7 +153,7 @@ class Corrections(Wrapper):
         return clipped
 
     def _begin(self, rows: Flags, pictures: Any) -> None:
-        """Forget the proposals of some rows, and see their silhouettes."""
+        """Forget the proposals of some rows, and store their new silhouettes."""
         self._observed[rows] = shrunk(pictures[rows, ..., ::2])
         self._best[rows] = 0.0
         self._best_drawn[rows] = 0.0
@@ -162,7 +177,7 @@ def features(
         drawn: The silhouettes of the best proposals (n, p); zeros before the first.
         best: The best proposals (n, d).
         first: Which rows (n,) have no proposal yet.
-        failures: Corrections (n,) in vain.
+        failures: The corrections (n,) since the best proposals.
     """
     shown_failures = np.minimum(failures, MOST_FAILURES) / MOST_FAILURES
     seen = [

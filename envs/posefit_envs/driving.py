@@ -289,12 +289,12 @@ def _stepwise(problem: Problem, optimiser: Optimiser) -> Generator[Array, float,
         costs = np.empty(len(proposals))
         for k, proposal in enumerate(proposals):
             costs[k] = yield proposal
-        # counted by hand: the costs came from steps, and the problem was never called
+        # counted here: the costs are those of steps, and the problem was never called
         problem.count(proposals, costs)
         optimiser.tell(proposals, costs)
     if not problem.evaluations:
         raise error.Error(
-            f"evaluations must hold one population of {len(proposals)}, "
+            f"evaluations must be at least {len(proposals)}, one population, "
             f"got {problem.budget}"
         )
 

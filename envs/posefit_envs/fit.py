@@ -37,8 +37,8 @@ class FitImageEnv(SearchEnv):
     ## Description
     The observation shows the silhouette of a person. Each step proposes a pose; its
     cost is the mismatch between the silhouette and the proposed body. An episode is a
-    few proposals for one silhouette. They are too few for a blind search: an agent must
-    look.
+    few proposals for one silhouette. These are too few for a search that learns only
+    the costs: an agent must use the picture.
 
     ## Action Space
     `Box(-1, 1, (d,), float32)`: a proposal. With `prior="pca"` and a known translation,
@@ -50,7 +50,8 @@ class FitImageEnv(SearchEnv):
     | 3, 4, 5 | root translation if `translation="searched"` | 0.5 m around a guess |
     | the rest | latents of the prior | the range of its training poses |
 
-    Actions outside are clipped, with one warning. float64 actions are not rounded.
+    Actions outside the box are clipped, with one warning. float64 actions are not
+    rounded.
 
     ## Observation Space
     `Box(0, 255, (height, width, 2 views), uint8)`, for each view:
@@ -72,24 +73,23 @@ class FitImageEnv(SearchEnv):
 
     ## Episode End
     Terminates after `max_evaluations` proposals. Only a time limit of Gymnasium
-    truncates. Pictures do not show how many proposals are left: the information does.
+    truncates. The number of proposals left is not in the pictures, but in the infos.
 
     ## Information
     A step and a reset give `cost`, `best_cost`, `evaluations`, `remaining_steps`,
     `areas` (views, 3) R, B, Y in pixels, and `instance`. In training they also give
-    `truth` (d,), the proposal nearest to the true pose, and `error_degrees`, the last
-    proposal's error against the truth, unless `errors=False`. The test split has no
-    answer to read, unless `evaluate=True`. Before the first proposal, costs and errors
-    are infinite.
+    `truth` (d,), the proposal nearest to the true pose, and `error_degrees`, the error
+    of the last proposal's pose, unless `errors=False`. The test split gives neither,
+    unless `evaluate=True`. Before the first proposal, costs and errors are infinite.
 
     ## Arguments
     - `motion="walk"`: a kind of built-in motion, a list of kinds, or "all".
-    - `held_out_people=True`: an instance shows a person: one person's style of the
-      motion, and a body whose bones and girths differ by up to 10 % from the average.
-      Held-out instances show the styles of two people of whom training instances and
-      the prior have nothing, in any motion. If false, everybody has the average body
-      and the mean of all styles, in training and in the test; `motion` may then also be
-      a single style, or an .amc or .bvh file.
+    - `held_out_people=True`: an instance shows one person's style of the motion, and a
+      body whose bones and girths differ by up to 10 % from the average. Held-out
+      instances show the styles of two people who occur neither in training instances
+      nor in the prior's training motions. If false, everybody has the average body and
+      the mean of all styles, in training and in the test; `motion` may then also be a
+      single style, or an .amc or .bvh file.
     - `split="train"`: instances 0 to 9,999, or `"test"`: 10,000 to 19,999, which are
       held out. Numbers of the other split are refused.
     - `instance=None`: a number of the split; by default each reset draws one.
@@ -107,8 +107,8 @@ class FitImageEnv(SearchEnv):
       `{"holes": 0.3, "shadow": 0.5}`; see `posefit.silhouette.corruption`.
     - `mismatch_percent=0.0`: the largest difference between the bones and radii of the
       fitted body and the person's.
-    - `errors=True`: whether infos hold the truth in training. `evaluate=False`: whether
-      they do in the test.
+    - `errors=True`: whether infos contain the truth in training. `evaluate=False`:
+      whether they do in the test.
     - `max_evaluations=8`.
 
     ## Levels

@@ -135,7 +135,7 @@ class Races:
         """
         before = self.problems.best_costs[rows]
         chosen = actions.argmax(axis=1)
-        # the last choice stands for no search yet: the worst one makes room
+        # the last choice is a new search, which replaces the worst one
         for k in np.flatnonzero(chosen == self.searches).tolist():
             row = int(rows[k])
             chosen[k] = self.costs[row].argmax()
@@ -252,8 +252,8 @@ class RaceEnv(SearchEnv):
     | 0 to searches - 1 | this search runs its next generation |
     | searches | the search with the highest best cost is replaced by a new one |
 
-    The first generation of a new search is its first population. Actions outside are
-    clipped, with one warning.
+    The first generation of a new search is its first population. Actions outside the
+    box are clipped, with one warning.
 
     ## Observation Space
     `Box(0, 1, (4 searches + 3,), float32)`, with k searches:

@@ -55,7 +55,7 @@ def render_frame(
     else:
         panels.append(blank(HEIGHT, HEIGHT))
     image = np.hstack(panels)
-    # drawing is in the order blue, green, red of OpenCV; the last line turns it round
+    # OpenCV draws blue, green, red; the last line reverses the order of the channels
     words = blank(STRIP, image.shape[1])
     write(words, label, (8, 21), scale=0.6)
     return np.ascontiguousarray(np.vstack([image, words])[..., ::-1])

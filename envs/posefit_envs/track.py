@@ -198,7 +198,7 @@ class TrackEnv(SearchEnv):
         infos["instance"] = self.number
 
     def _frame(self) -> int:
-        # after the last frame an episode stays in it
+        # past the last frame, the last frame
         return min(self._sequence.frame, self.frames - 1)
 
     @property
@@ -337,7 +337,7 @@ class TrackVectorEnv(SearchVectorEnv):
 
     def _frames(self) -> Rows:
         """Return the current frame (n,) of each environment."""
-        # after the last frame an episode stays in it
+        # past the last frame, the last frame
         frames = [self._sequences[i].frame for i in range(self.num_envs)]
         return np.minimum(frames, self.frames - 1)
 

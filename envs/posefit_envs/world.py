@@ -99,7 +99,7 @@ class World:
 
     @property
     def shows_truth(self) -> bool:
-        """Whether infos hold the truth: in the test split, only with `evaluate`."""
+        """Whether infos contain the truth: in the test split, only with `evaluate`."""
         return self.errors and (self.evaluate or self.split == "train")
 
     @cached_property
@@ -467,7 +467,7 @@ def instance(
     facing = float(truth.poses[0, 0])
     middle = truth.translations.mean(axis=0)
     middle[1] = HEIGHT
-    # who walks farther is seen from farther away, and stays in the picture
+    # a longer walk is seen from farther away, so that the person stays in the picture
     reach = DISTANCE + 0.5 * float(np.ptp(truth.translations[:, [0, 2]], axis=0).max())
     turn = rng.uniform(-180.0, 180.0) if world.yaw == "unknown" else 0.0
     azimuths = []

@@ -1,7 +1,7 @@
 """The areas of thousands of poses, counted on a device in parts.
 
 While one part is counted, the next one is copied. Bodies, cameras and silhouettes are
-copied to the device once, and stay there as long as the objects live.
+copied to the device once, and are kept there until the objects are deleted.
 """
 
 from collections import deque

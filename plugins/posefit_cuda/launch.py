@@ -33,7 +33,7 @@ ROW, STOP, FIRST, LAST, TOP, BOUNDS = range(6)
 
 
 def on_device(function):
-    """Return a function that is compiled for CPUs, compiled for a device instead."""
+    """Return the version for a device of a function that is compiled for CPUs."""
     return cuda.jit(device=True)(getattr(function, "py_func", function))
 
 
@@ -83,7 +83,7 @@ def _spanned_compiled(first, stop):  # noqa: ARG001
 
 
 def floored(number):
-    """Return a number rounded down, in its own type; infinity stays infinity."""
+    """Return a number rounded down, in its own type; infinity is not changed."""
     return np.floor(number)
 
 
@@ -93,7 +93,7 @@ def _floored_compiled(number):  # noqa: ARG001
 
 
 def ceiled(number):
-    """Return a number rounded up, in its own type; infinity stays infinity."""
+    """Return a number rounded up, in its own type; infinity is not changed."""
     return np.ceil(number)
 
 

@@ -228,12 +228,12 @@ class Exemplars:
     def continuation(self, states: Rows, seconds: float) -> tuple[Codes, Array, Array]:
         """Return the continuation of some states' clips, `seconds` later.
 
-        Values between two poses are interpolated. A clip stays in its last pose after
-        its end and, with negative seconds, in its first pose before its beginning.
+        Values between two poses are interpolated. After its end a clip has its last
+        pose, and before its beginning, with negative seconds, its first pose.
 
         Args:
             states: (n,) the states that continue.
-            seconds: The time that passes, negative for what came before.
+            seconds: The time that passes; negative for the time before a state.
 
         Returns:
             The codes (n, D), the turns (n,) in radians, and the displacements (n, 3) in
@@ -424,7 +424,7 @@ def exemplars_for(task: Task) -> Exemplars:
     """Return the states that a task may learn from.
 
     A backwards task gets its motions reversed. They are reversed again here, so that
-    one set of states serves both directions.
+    one set of states can be used in both directions.
     """
     training = task.training
     if task.backwards:

@@ -35,9 +35,10 @@ START_TURN = np.radians(8.0)  # standard deviation of an angle from the start of
 # Standard deviations of the root from its start, metres.
 KNOWN_SHIFT = 0.003
 ALIGNED_SHIFT = 0.05
-# The mean of the nearest poses of clips pulls a hypothesis that continues. A pose gets
-# less weight the farther it is away, compared to the nearest one: `SAME_DISTANCE` is
-# the standard deviation, and `SAME_TURN` that of an angle from the mean.
+# A hypothesis that continues is pulled towards the mean of the nearest poses of clips.
+# A pose gets less weight the farther away it is, compared to the nearest one:
+# `SAME_DISTANCE` is the standard deviation, and `SAME_TURN` that of an angle from the
+# mean.
 SIMILAR_POSES = 8
 
 PosesAndPlaces = tuple[Array, Array]  # (n, 66), and (n, 3) metres

@@ -82,7 +82,7 @@ class FrameCosts:
         A known root gives the place. Otherwise it is the place near each of `places`
         (n, 3) at which the pose fits the silhouettes.
         """
-        # a frame of a known motion may lack its root: it then stays where it was
+        # a frame of a known motion may lack its root: `places` are then returned
         if self.root is not None or self._task.translation == "known":
             return self.at_root(places)
         return align(*self._scene, poses, places, self._task.threads)

@@ -31,7 +31,7 @@ def lower_distances(distances, code, tile, partial):
     compared. `partial` (LANES,) is a buffer.
 
     Returns:
-        Whether the first components left open that any distance is lower.
+        Whether all components were compared.
 
     """
     near = False

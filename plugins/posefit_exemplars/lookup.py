@@ -225,7 +225,7 @@ class Lookup:
             if np.isfinite(silhouette.extent).all():
                 picture, azimuth, elevation = straightened(camera, silhouette)
                 rounded = float(np.round(elevation / ELEVATION) * ELEVATION)
-                # making a table, once per process, is no cost of this frame
+                # a table is made once per process, so its poses do not count here
                 with uncounted():
                     table = _table(self.exemplars, rounded)
                 views.append((table, azimuth))

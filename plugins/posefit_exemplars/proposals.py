@@ -44,8 +44,8 @@ CANDIDATE_TURNS = (0.0, -2.0, 2.0)
 # Share of the proposed states for where clips continue. The others are for a search
 # everywhere.
 CONTINUED_SHARE = 0.25
-# A search everywhere gives this share of its costs to poses that are similar to the
-# cheapest ones.
+# A search everywhere uses this share of its evaluations for poses that are similar to
+# the cheapest ones.
 SIMILAR_SHARE = 0.25
 GROUP_POSES = 20  # similar poses, drawn at random from the group of each, at most
 
@@ -67,7 +67,7 @@ def min_fit_evaluations() -> float:
 
 
 def next_states(exemplars: Exemplars, steps: ClipSteps, count: int) -> Beam:
-    """Return at most `count` states that a beam reaches in one step, at least cost.
+    """Return the states that a beam reaches most cheaply in one step, at most `count`.
 
     The costs are those of `ClipSteps.costs`, without that of an aligned root. Steps
     that cost as much as a jump are left out. Each pose that is reached gets the yaw at

@@ -39,7 +39,8 @@ def sharpness(costs: Array, wanted: float) -> float:
     side = 0  # which end the last step moved: 1 the low one, -1 the high one
     beta = high
     # False position, by the Illinois rule: if the same end moves twice, the value at
-    # the other end is halved. Otherwise a curved function would hold it for ever.
+    # the other end is halved. Otherwise that end would never move if the function is
+    # curved.
     for _ in range(MAX_STEPS):
         beta = (low * below - high * above) / (below - above)  # DEUTSCHER2005 (beta)
         if abs(rest := survival(costs, beta) - wanted) < TOLERANCE:

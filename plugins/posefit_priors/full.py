@@ -15,8 +15,8 @@ from posefit_priors.pca import angles_of
 class Full:
     """Every joint angle that has a range is a latent.
 
-    An angle without a range stays at its training mean. Limits are widened if training
-    poses exceed them.
+    An angle without a range is fixed at its training mean. Limits are widened if
+    training poses exceed them.
 
     Settings:
         limits: "asf", the joint limits that the skeleton's file states, or "training",
@@ -26,7 +26,7 @@ class Full:
     low: Array  # (m,) radians
     high: Array  # (m,)
     angles: NDArray[np.intp]  # (m,) indices of the free angles
-    rest: Array  # (63,) radians, the mean; angles without a range stay there
+    rest: Array  # (63,) radians, the mean; angles without a range are fixed there
 
     def __init__(self, *, limits: Literal["asf", "training"] = "asf") -> None:
         choices(Full.__init__, locals())

@@ -25,7 +25,7 @@ class Loose:
     """The space of `pca`, with extra latents for shoulders, elbows, hips and knees.
 
     Each angle of these joints that moves in training has one extra latent, in radians.
-    It is added to the angle that the components give. The sum stays within the
+    It is added to the angle that the components give. The sum is kept within the
     skeleton's joint limits if the skeleton states some.
 
     Settings:

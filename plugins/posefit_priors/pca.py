@@ -101,7 +101,9 @@ def angles_of(angles: Array, least: int) -> Array:
     if angles.ndim != 2 or angles.shape[1] != 63:
         raise InputError(f"angles must have shape (T, 63), got {angles.shape}")
     if len(angles) < least:
-        raise InputError(f"angles must hold at least {least} frames, got {len(angles)}")
+        raise InputError(
+            f"angles must contain at least {least} frames, got {len(angles)}"
+        )
     if not np.isfinite(angles).all():
         raise InputError(
             "angles must be finite, "

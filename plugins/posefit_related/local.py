@@ -140,5 +140,5 @@ class Local:
         self._push(self._best_cost, self._best)
 
     def _push(self, cost: float, pose: Array) -> None:
-        self._count += 1  # ties go to the pose that came first
+        self._count += 1  # of equal costs, the first pose is taken
         heappush(self._open, (cost, self._count, pose))

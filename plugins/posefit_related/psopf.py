@@ -104,7 +104,7 @@ class PSOPF:
         self._x = repair(self._space, self._x + self._v, self._pbest)
 
     def advance(self, space: Space) -> None:
-        """Resample the particles by their bests' weights, and enter the next frame."""
+        """Resample the particles by their bests' weights; begin the next frame."""
         weights = weigh(self._pbest_cost, self._sharpness)  # KRZESZOWSKI2010 (weights)
         rows = systematic_rows(weights, self._rng.random(), len(weights))
         # the next frame's box is centred elsewhere

@@ -140,7 +140,7 @@ class Smoothing:
 
 
 def differences(states: Array, origin: Array) -> Array:
-    """Return states (..., 4 + m) minus an origin, the short way round in yaw."""
+    """Return states (..., 4 + m) minus an origin, the shorter way in yaw."""
     away = states - origin
     away[..., 0] = (away[..., 0] + np.pi) % (2.0 * np.pi) - np.pi
     return np.asarray(away)

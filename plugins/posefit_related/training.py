@@ -8,7 +8,7 @@ from posefit.plugin import Array, Task
 def training_poses(task: Task) -> Array:
     """Return the poses (T, 66) of all training motions. Raises ValueError if none."""
     if not task.training:
-        raise ValueError("training must hold a motion to learn from, got none")
+        raise ValueError("training must contain a motion to learn from, got none")
     return np.concatenate([motion.poses for motion in task.training])
 
 
@@ -22,7 +22,9 @@ def training_angles(angles: Array, least: int) -> Array:
     if angles.ndim != 2 or angles.shape[1] != 63 or not np.isfinite(angles).all():
         raise ValueError(f"angles must be finite and (T, 63), got {angles.shape}")
     if len(angles) < least:
-        raise ValueError(f"angles must hold at least {least} frames, got {len(angles)}")
+        raise ValueError(
+            f"angles must contain at least {least} frames, got {len(angles)}"
+        )
     return angles
 
 

@@ -215,7 +215,7 @@ def reproduce(
     """Return the tables of an experiment.
 
     With a folder, tables and figures are also written there, and runs that it already
-    holds are not repeated.
+    contains are not repeated.
 
     Args:
         experiment: The experiment.
@@ -224,7 +224,7 @@ def reproduce(
         progress: Shows the progress of the runs, or None.
 
     Raises:
-        InputError: If the folder cannot be written, holds something else, or holds runs
+        InputError: If the folder cannot be written, has other content, or contains runs
             made under other conditions.
         ImportError: If the library that draws figures is not installed.
     """
@@ -260,11 +260,11 @@ def reproduce(
 
 
 def _make_runs_folder(folder: Path) -> None:
-    """Make the folder of runs. Raises InputError if the folder holds something else."""
+    """Make the folder of runs. Raises InputError if the folder has other content."""
     try:
         if folder.is_dir() and any(folder.iterdir()) and not (folder / "runs").is_dir():
             raise InputError(
-                f"{folder}: the folder holds something else: choose a new folder, "
+                f"{folder}: the folder contains something else: choose a new folder, "
                 "or one of an earlier reproduction"
             )
         (folder / "runs").mkdir(parents=True, exist_ok=True)

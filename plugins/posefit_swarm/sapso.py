@@ -26,7 +26,7 @@ from posefit.plugin import (
 )
 
 # ours: how many further steps are drawn if the prior refuses one; after these the
-# particle stays at rest. Interpretation S7
+# particle does not move. Interpretation S7
 REDRAWS = 10
 
 Rows = NDArray[np.int64]
@@ -202,8 +202,9 @@ def redrawn(
     """Return velocities and positions (n, d) after an allowed step from x (n, d).
 
     If a particle's step is not allowed, `redraws` further steps are drawn in one call,
-    and the first allowed one is taken. If none is allowed, the particle stays, at rest.
-    Interpretation S7. The paper's letter limits velocities as well.
+    and the first allowed one is taken. If none is allowed, the particle does not move
+    and its velocity is 0. Interpretation S7. The paper's letter limits velocities as
+    well.
 
     Args:
         x: Positions (n, d).

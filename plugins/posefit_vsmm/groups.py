@@ -14,13 +14,13 @@ class Topology(NamedTuple):
     groups: Mapping[str, tuple[str, ...]]  # in the order of their numbers
     neighbours: Mapping[str, tuple[str, ...]]  # the models that each switches into
     activities: Mapping[str, tuple[str, ...]]  # the labels of frames, and their models
-    # the probability that a model stays; its neighbours share the rest
+    # the probability that a model is kept; its neighbours share the rest
     stay: float
 
     def transition(self, models: Sequence[str]) -> Array:
         """Return the transition matrix (r, r) over some of the models.
 
-        A model stays with probability `stay`; its neighbours among `models` share the
+        A model is kept with probability `stay`; its neighbours among `models` share the
         rest equally. A model with no neighbour there may switch into any of the others;
         otherwise it could never be left.
         """

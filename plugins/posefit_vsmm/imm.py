@@ -114,7 +114,7 @@ class IMM:
     """The filter over models that form a Markov chain.
 
     `predict(states, covariances)` returns each model's state (r, n) and covariance
-    (r, e, e) a frame later. Row i of `transition` (r, r) holds the probabilities of the
+    (r, e, e) a frame later. Row i of `transition` (r, r) has the probabilities of the
     models after model i. Residuals are taken at the predicted states, or, by the
     patent's (9), at the mixed states before the prediction.
 
@@ -133,7 +133,7 @@ class IMM:
             and np.allclose(self.transition.sum(axis=1), 1.0)
         ):
             raise InputError(
-                "transition must hold probabilities whose rows sum to 1, "
+                "transition must contain probabilities whose rows sum to 1, "
                 f"got {self.transition.tolist()}"
             )
 

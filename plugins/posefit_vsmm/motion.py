@@ -140,7 +140,7 @@ class MotionModels:
     def captured_nearest(self, name: str, state: Array) -> Array:
         """Return a state (43,) in the nearest captured pose of a model.
 
-        Its position and heading stay.
+        Its position and heading are not changed.
         """
         poses = self.captured[self.names.index(name)].reshape(-1, TURNS, 4)
         heading, turns = without_heading(state)

@@ -3,7 +3,7 @@
 A state is (43,): the root's translation in metres, then ten quaternions w, x, y, z, of
 the whole body and of nine bones relative to their parents. Its error is (33,): metres,
 then one rotation vector per quaternion, applied on its right (Interpretation V4).
-Joints that the state does not hold, such as the back's, follow the others: see
+Joints that the state does not contain, such as the back's, follow the others: see
 `DependentJoints`. The 17 points are Interpretation V2.
 """
 
@@ -172,7 +172,7 @@ def inverse_tangents(states: Array) -> Array:
 
 
 class DependentJoints(NamedTuple):
-    """How the joints that a state does not hold follow it.
+    """How the joints that a state does not contain follow it.
 
     Their angles are `matrix` @ (the nine rotation vectors) + `offset`.
     """

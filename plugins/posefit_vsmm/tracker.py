@@ -345,7 +345,7 @@ class VSMM:
     ) -> Iterator[Frame]:
         """Yield a `Frame` for each observation.
 
-        Its `details` hold the models, their probabilities, the group and the joints.
+        Its `details` contain the models, their probabilities, the group and the joints.
         """
         track_filter = TrackFilter(self, rng)
         for observation in observations:

@@ -1,7 +1,7 @@
 """Compilation by numba, saved for later processes; announced and timed.
 
 Compiled functions are saved by numba (`cache=True`), in a folder for each module. numba
-itself only checks the file that a function is in, but compiled code holds copies of
+itself only checks the file that a function is in, but compiled code contains copies of
 functions and constants of other modules. So the folder's name has a digest of all their
 sources and of numba's version: a change of any of them is another folder. `folders`
 keeps damaged files and other processes from doing harm.
@@ -68,7 +68,7 @@ class _Compilation(event.Listener):  # type: ignore[misc]
         if event.data["dispatcher"].py_func.__module__.startswith("posefit"):
             self.announced = True
             logging.getLogger("posefit").warning(
-                "compiling the kernels, once on this machine; "
+                "compiling kernels for their first use on this machine; "
                 "this takes ten seconds or more ..."
             )
 

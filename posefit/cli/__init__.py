@@ -71,7 +71,7 @@ def _added() -> dict[str, click.Command]:
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="posefit")
-@click.option("--debug", is_flag=True, help="Show the traceback of a mistake.")
+@click.option("--debug", is_flag=True, help="Show the traceback of an error.")
 def main(debug: bool) -> None:
     """Recover a person's 3D motion from masks, by search.
 
@@ -83,7 +83,7 @@ def main(debug: bool) -> None:
     if debug:
         import logging
 
-        # also of mistakes that cost a warning only, such as a picture's
+        # also for an error that only causes a warning, such as a failed picture
         logger = logging.getLogger("posefit")
         logger.setLevel(logging.DEBUG)
         logger.addHandler(logging.StreamHandler())
@@ -110,8 +110,8 @@ def run() -> None:
         )
         raise SystemExit(MISTAKE) from None
     except SystemExit as end:
-        # Python waits for every thread that is no daemon, so a thread that a plugin
-        # left running could keep the process alive for ever
+        # Python waits for every thread that is not a daemon, so a thread that a plugin
+        # left running could keep the process alive forever
         running = []
         for thread in threading.enumerate():
             own = thread.name.startswith(f"{POOL}_")

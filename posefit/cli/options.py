@@ -185,8 +185,8 @@ FRAMES = under("Source and camera")(
     default=":",
     callback=parsed_by(text_range),
     metavar="A:B",
-    help="Use only frames A to B - 1, numbered as filmed; of a motion, after "
-    "resampling.",
+    help="Use only frames A to B - 1. Footage is numbered as filmed, a motion "
+    "after resampling.",
 )
 JSON = _result(
     "--json",
@@ -212,7 +212,7 @@ EXTRACTION = (
         "--roi",
         callback=parsed_by(box),
         metavar="X,Y,W,H",
-        help="Region of the video that holds the person, in pixels.",
+        help="Region of the video that contains the person, in pixels.",
     ),
     _video(
         "--ignore",
@@ -222,7 +222,7 @@ EXTRACTION = (
     _video(
         "--width",
         type=int,
-        help="Larger videos are scaled down to this width; default 640.",
+        help="Scale wider videos down to this width, in pixels. Default: 640.",
     ),
 )
 WITHOUT = under("Method and budget")(
@@ -239,7 +239,7 @@ TRACK: tuple[Any, ...] = (
     _result(
         "--out",
         metavar="DIR",
-        help="Write poses, table, video and picture to this new folder.",
+        help="Write poses, tables, video and pictures to this new folder.",
     ),
     _result(
         "--write",

@@ -33,7 +33,7 @@ def open_streams() -> None:
             os.close(null)
             null = number
         os.set_inheritable(null, True)
-        # open as long as the process lives
+        # open until the process ends
         setattr(sys, name, open(null, mode))  # noqa: SIM115
 
 

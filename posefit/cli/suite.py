@@ -130,7 +130,7 @@ def suite_run(
             instances=numbers,
             infeasible=infeasible,
         )
-        # a function without the dimension is no error, because others have it
+        # a function without the dimension is not an error, because others have it
         for function in problems.passed_over:
             say(
                 f"function {function.number} is left out: "

@@ -124,7 +124,7 @@ def report(
     as_json: bool,
     **others: Any,
 ) -> None:
-    """Write the results of sweeps in DIR as a page that any browser opens, offline.
+    """Write a report on the sweeps in DIR: a web page that needs no network.
 
     Each DIR is a folder of ledgers (.sqlite), or one ledger.
 

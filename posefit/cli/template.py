@@ -76,7 +76,7 @@ def write_plugin(
     target = Path(folder or f"posefit-{words['dashed']}")
     target.parent.mkdir(parents=True, exist_ok=True)
     with new_folder(target) as building:
-        # the kit has no checks for a command
+        # `posefit check` has no rules for a command
         test = COMMAND if kind == COMMAND else "kit"
         written = {
             "pyproject.toml": "pyproject.toml",

@@ -70,10 +70,10 @@ def track(
     if live is not None:
         return _track_live(live, as_json, options, shown)
 
-    # plugins may print, and stdout must hold nothing but the JSON object
+    # plugins may print, and stdout must contain nothing but the JSON object
     with results_alone() if as_json else nullcontext():
         result = run(progress=shown, **_arguments(options))
-    shown.log(f"took {_times(shown)}")
+    shown.log(f"time: {_times(shown)}")
     _print(result.content, as_json, {}, options, verbose, HINTS)
 
 
@@ -84,7 +84,7 @@ def _times(shown: Progress) -> str:
     phases = [f"{name} {seconds:.1f} s" for name, seconds in shown.phases.items()]
     compiling = compiling_seconds()
     if compiling:
-        phases.append(f"of which compiling, once on this machine, {compiling:.1f} s")
+        phases.append(f"{compiling:.1f} s of this for compiling kernels")
     return ", ".join(phases)
 
 

@@ -145,8 +145,8 @@ class Measures:
         "interval",
         "mm",
         0,
-        "radius about a joint that holds it in 50, 80 and 95 % of cases, the mean over "
-        "all except the root",
+        "radius of the balls about joints that contain the true joint in 50, 80 and "
+        "95 % of cases, the mean over all joints except the root",
     )
     unknown_rate: float | None = _share(
         "flagged unknown",

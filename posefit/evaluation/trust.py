@@ -358,7 +358,7 @@ class Trust:
         (1.0, 0.35, 0.55), "the body and the mask overlap by only {iou:.0%}"
     )
     acceleration: float | None = _sign(
-        (0.0, 14.0, 60.0), "joints jerk, by {acceleration:.0f} m/s2"
+        (0.0, 14.0, 60.0), "joints move jerkily, at {acceleration:.0f} m/s2"
     )
     unknown_signs: Mapping[str, str]
 

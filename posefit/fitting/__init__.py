@@ -10,7 +10,7 @@
 | the cost of proposals for one observation, and aligning a body with it | cost.py |
 | optimisers, and the base of adapters of other libraries | optimiser.py |
 | trackers; one search per frame around a prediction. SAPSO section 4 | tracker.py |
-| weights of costs, and how many samples they are worth | weights.py |
+| weights of costs, and their effective number of samples | weights.py |
 | errors against a truth. SAPSO (8)-(10) | metrics.py |
 | the likelihood of a detector's landmarks | landmarks.py |
 | checks of the answers of optimisers and priors | validation.py |

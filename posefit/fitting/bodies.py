@@ -41,7 +41,7 @@ def scaled_bodies(
         lengths: (m, 26) factors of the bones' lengths.
         girths: (m, 26) factors of the radii.
         height: Each body is scaled to this stature in metres, see `Body.stature`. None:
-            statures stay.
+            statures are not changed.
 
     """
     offsets = body.skeleton.offsets * lengths[:, :, None]

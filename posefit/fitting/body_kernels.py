@@ -27,7 +27,7 @@ from posefit.silhouette.rasteriser import (
 
 
 class Bodies(NamedTuple):
-    """The bodies (m) that are tried, as the kernels want them."""
+    """The bodies (m) that are tried, as arrays for the kernels."""
 
     offsets: Array  # (m, 26, 3) bones in their own frames
     radii: Array  # (m, 26, 2)

@@ -103,7 +103,7 @@ def wrap(space: Space, proposals: Array) -> Array:
 
 
 def displacement(space: Space, origin: Array, target: Array) -> Array:
-    """Return target - origin (..., d), the short way round in periodic coordinates.
+    """Return target - origin (..., d), the shorter way in periodic coordinates.
 
     Args:
         space: The space, for its periodic coordinates.
@@ -175,7 +175,7 @@ def draw_population(space: Space, rng: np.random.Generator, count: int) -> Array
         The proposals (count, d).
 
     Raises:
-        InputError: Nothing is feasible, or the count is no whole number above 0.
+        InputError: Nothing is feasible, or the count is not a whole number above 0.
 
     Example:
         >>> import numpy as np
@@ -310,7 +310,7 @@ def sample_normal(
 
     `spread` (d,) or (n, d) has the standard deviations. A coordinate outside the box is
     folded back into it, as at a mirror. An infeasible draw is redrawn at most 100
-    times, and then stays at its mean.
+    times, and then replaced by its mean.
 
     Args:
         space: The space.
@@ -383,9 +383,9 @@ def repair(space: Space, proposals: Array, home: Array) -> Array:
         >>> import numpy as np
         >>> from posefit.plugin import repair
         >>> from posefit.testing.toy import Toy
-        >>> proposals = np.array([[0.5, 0.5]])
+        >>> proposals = np.array([[0.5, 0.5], [1.5, 0.5]])
         >>> repair(Toy(2), proposals, np.zeros(2)).tolist()
-        [[0.5, 0.5]]
+        [[0.5, 0.5], [1.0, 0.5]]
     """
     repaired = np.clip(wrap(space, np.asarray(proposals, dtype=np.float64)), -1.0, 1.0)
     repaired = np.where(np.isfinite(repaired), repaired, home)

@@ -28,7 +28,7 @@ PLAIN = (bool, int, float, str, type(None), np.generic)
 
 
 class UnknownError(Exception):
-    """A filter has an attribute that is no plain value."""
+    """A filter has an attribute that is not a plain value."""
 
 
 def carried(
@@ -36,7 +36,7 @@ def carried(
 ) -> dict[str, Any]:
     """Return the state of a filter after a frame that was searched in `space`.
 
-    It is empty if an attribute of the filter is no plain value.
+    It is empty if an attribute of the filter is not a plain value.
     """
     try:
         return {
@@ -96,7 +96,7 @@ def _fields(space: SearchSpace) -> dict[str, Any]:
 
 
 def _kept(value: Any, space: Any, rng: Any) -> Any:
-    """Return a value as plain values. Raises UnknownError if that is impossible."""
+    """Return a value in a plain form. Raises UnknownError if that is impossible."""
     if value is space:
         return {KIND: "space"}
     if value is rng:
@@ -143,7 +143,7 @@ def _made(kept: Any, space: Any = None, rng: Any = None) -> Any:
             return members
         return tuple(members)
     if kind not in ("dict", "start"):
-        raise InputError(f"a kept value must be of a known kind, got {kind}")
+        raise InputError(f"a stored value must be of a known kind, got {kind}")
     if kind == "start":
         values = values["values"]
     made = {name: _made(value, space, rng) for name, value in values.items()}

@@ -51,6 +51,9 @@ def between(
     Example:
         >>> from posefit.plugin import between
         >>> between("quantile", 0.99, 0.0, 1.0)
+        >>> between("quantile", 1.0, 0.0, 1.0, ends=False)
+        Traceback (most recent call last):
+        posefit.errors.InputError: quantile must lie between 0 and 1, got 1.0
     """
     if ends:
         inside = low <= value <= high
@@ -77,6 +80,9 @@ def positive(name: str, value: float) -> None:
     Example:
         >>> from posefit.plugin import positive
         >>> positive("shrink", 0.95)
+        >>> positive("shrink", 0.0)
+        Traceback (most recent call last):
+        posefit.errors.InputError: shrink must be above 0, got 0.0
     """
     if not (math.isfinite(value) and value > 0.0):
         raise InputError(f"{name} must be above 0, got {value}")
@@ -85,9 +91,6 @@ def positive(name: str, value: float) -> None:
 def whole(name: str, value: object, least: int) -> int:
     """Return a whole number as an int.
 
-    Raises:
-        InputError: If the value is no whole number, or less than `least`.
-
     Args:
         name: The value's name in the message.
         value: The value, of any whole-number type.
@@ -95,6 +98,9 @@ def whole(name: str, value: object, least: int) -> int:
 
     Returns:
         The value.
+
+    Raises:
+        InputError: The value is not a whole number, or less than `least`.
 
     Example:
         >>> import numpy as np
@@ -188,6 +194,9 @@ def choices(settings: Any, values: Mapping[str, object]) -> None:
         >>> def factory(space, rng, *, variant: Literal["a", "b"] = "a"):
         ...     choices(factory, locals())
         >>> factory(None, None, variant="b")
+        >>> factory(None, None, variant="c")
+        Traceback (most recent call last):
+        posefit.errors.InputError: variant must be one of a, b, got 'c'
     """
     for name, annotation in settings.__annotations__.items():
         if listed := choices_of(resolved(settings, annotation)):

@@ -887,9 +887,10 @@ def solve_symmetric(matrix, right):
     Only the lower half of the matrix (m, m) is read. The matrix is overwritten, and the
     right side (m,) becomes the solution.
 
-    The last number is eliminated first: an angle shares second derivatives only with
-    those between it and the root, and such zeros stay zero only from the ends of the
-    limbs inwards (Featherstone, Rigid body dynamics algorithms, 2008, section 6.5).
+    The last number is eliminated first, so from the ends of the limbs inwards: an angle
+    shares second derivatives only with those between it and the root, and in this order
+    the other zeros remain zero (Featherstone, Rigid body dynamics algorithms, 2008,
+    section 6.5).
     """
     m = right.size
     for k in range(m - 1, -1, -1):

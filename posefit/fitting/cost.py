@@ -103,6 +103,11 @@ class SilhouetteCost:
         threads: number of threads. Does not change the costs.
         blank: whether all silhouettes may be empty, as in the middle of a track.
 
+    Raises:
+        InputError: the numbers of cameras and silhouettes or their sizes differ, all
+            silhouettes are empty, pixels are not square, or `beta` or `threads` is out
+            of range.
+
     Example:
         >>> import numpy as np
         >>> import posefit

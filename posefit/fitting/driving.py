@@ -99,7 +99,7 @@ def drive(
         while True:
             start = clocks()
             try:
-                # rendering a motion is no evaluation
+                # rendering a motion is not an evaluation
                 with uncounted():
                     observation = next(coming)
             except StopIteration:
@@ -209,7 +209,7 @@ def _with_true_cost(
     place = np.asarray(frame.translation, np.float64)[None]
     # copies without the packed bits, which the tracker may have changed
     observed = [replace(silhouette) for silhouette in observation.silhouettes]
-    # checking a frame is no evaluation
+    # checking a frame is not an evaluation
     with uncounted():
         costs, counts = pose_costs(
             task.body, task.cameras, observed, pose, place, audit.beta

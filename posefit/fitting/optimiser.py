@@ -14,7 +14,9 @@ WORST = 1e15  # few libraries work with nan, infinity or the square of 1e300
 
 
 class Optimiser(Protocol):
-    """Proposes populations and learns their costs; nothing to inherit.
+    """Proposes populations and learns their costs.
+
+    A class need not inherit from it: these two methods make it an optimiser.
 
     Example:
         >>> import numpy as np
@@ -65,9 +67,9 @@ class Filter(Optimiser, Protocol):
 # Builds an optimiser for one search, as `factory(space, rng, **settings)`: a Space, a
 # NumPy Generator that is the only source of randomness, and keyword-only settings. For
 # a factory that takes them, the driver fills in two settings: `evaluations`, the budget
-# of one search, and `iterations`, the populations after the first that this budget
-# holds. A factory with a true attribute `baseline` is the chance that others are
-# compared with: the kit of checks does not ask it to beat chance.
+# of one search, and `iterations`, the number of populations after the first for which
+# this budget is enough. A factory with a true attribute `baseline` searches at random,
+# as a baseline for the others: the checks do not require it to beat chance.
 OptimiserFactory = Callable[..., Optimiser]
 
 # The optimiser of the next frame. "start": a new one around the prediction, SAPSO (6),
@@ -104,12 +106,15 @@ def check_tell(waiting: int, proposals: Array, costs: Array) -> None:
         costs: The costs that `tell` got.
 
     Raises:
-        InputError: The shapes do not match, or nothing waits for costs.
+        InputError: The shapes do not match, or no proposals are waiting for costs.
 
     Example:
         >>> import numpy as np
         >>> from posefit.plugin import check_tell
         >>> check_tell(2, np.zeros((2, 9)), np.zeros(2))
+        >>> check_tell(2, np.zeros((2, 9)), np.zeros(3))
+        Traceback (most recent call last):
+        posefit.errors.InputError: ...
     """
     if not waiting:
         raise InputError("tell must follow ask, got costs before proposals")

@@ -62,11 +62,14 @@ class Prior(Latents, Protocol):
     """
 
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
-        """Learn from joint angles, and return itself.
+        """Learn from joint angles, and return the prior itself.
 
         Args:
-            angles: (T, 63) radians.
+            angles: The joint angles (T, 63) in radians.
             skeleton: The person's skeleton.
+
+        Returns:
+            The prior, now fitted.
 
         """
         ...
@@ -127,7 +130,7 @@ class Tilt:
         Args:
             prior: The fitted prior.
             motions: The motions.
-            share: The range holds this share of the residuals of each angle.
+            share: The range contains this share of the residuals of each angle.
             margin: Radians added to the range on either side.
 
         """
@@ -161,8 +164,8 @@ class Tilt:
     def around(self, added: Array, reach: Array) -> tuple[Array, Array]:
         """Return the middle and the half sides (2,) of a box of residuals.
 
-        The box stays in the range, so that near an end of the range its middle is not
-        the last residual.
+        The box is within the range, so near an end of the range its middle is not the
+        last residual.
 
         Args:
             added: (2,) the last residual.

@@ -33,11 +33,11 @@ Cost = Callable[[Array], Array]
 
 
 class BudgetError(InputError):
-    """A budget does not hold one population."""
+    """A budget is smaller than one population."""
 
 
 class BudgetSpentError(Exception):
-    """A call goes beyond the evaluations of a problem's budget.
+    """A call needs more evaluations than a problem's budget has left.
 
     Example:
         >>> import numpy as np
@@ -52,12 +52,12 @@ class BudgetSpentError(Exception):
 def minimise(
     problem: "Problem", optimiser: Optimiser, *, budget_known: bool = False
 ) -> "Problem":
-    """Let an optimiser use the budget of a problem, and return the problem.
+    """Minimise a problem with an optimiser, and return the problem.
 
-    The search ends when the optimiser proposes nothing, or a population larger than the
-    rest of the budget, which is not evaluated. A warning tells if the optimiser ends
-    before half of the budget is used, unless it was built with the budget
-    (`budget_known`), which some schedules follow.
+    The search ends when the optimiser proposes nothing, or when its next population
+    exceeds the rest of the budget; this population is not evaluated. If the optimiser
+    stops before half of the budget is used, a warning is given, because its schedule
+    may not know the budget. `budget_known` says that it does.
 
     Args:
         problem: what to minimise; it must have a budget.
@@ -68,19 +68,19 @@ def minimise(
         The same problem: `problem.best`, `problem.best_cost`, `problem.trace`.
 
     Raises:
-        BudgetError: the budget does not hold the first population.
+        BudgetError: the budget is smaller than the first population.
         InputError: the problem has no budget, the optimiser proposed nothing, or no
             cost was a finite number.
 
-    >>> import numpy as np
-    >>> from posefit import optimiser, suite
-    >>> problem = suite(
-    ...     "posefit-2026.3", function=1, instance=17, dimension=9, budget=200
-    ... )
-    >>> cma = optimiser("cma")(problem.space, np.random.default_rng(0))
-    >>> minimise(problem, cma).evaluations
-    200
-
+    Example:
+        >>> import numpy as np
+        >>> from posefit import minimise, optimiser, suite
+        >>> problem = suite(
+        ...     "posefit-2026.3", function=1, instance=17, dimension=9, budget=200
+        ... )
+        >>> cma = optimiser("cma")(problem.space, np.random.default_rng(0))
+        >>> minimise(problem, cma).evaluations
+        200
     """
     if problem.budget is None:
         raise InputError(f"{problem.id} must have a budget to be minimised, got none")
@@ -95,7 +95,7 @@ def minimise(
         raise InputError("the optimiser must propose a population, got an empty one")
     if not used:
         raise BudgetError(
-            f"evaluations must hold one population of {len(proposals)}, "
+            f"evaluations must be at least {len(proposals)}, one population, "
             f"got {problem.remaining_evaluations:.0f}"
         )
     if not np.isfinite(problem.best_cost):
@@ -119,6 +119,10 @@ class Problem:
     Call it with proposals (n, d) for their costs (n,), or with one proposal (d,) for a
     float. Every proposal counts as one evaluation, whether it is feasible or not.
 
+    A problem also has the attributes of its cost function, such as `problem.decode` in
+    a frame and `problem.look` in a suite. Attributes that COCO's problems have, too,
+    have the same names here.
+
     Args:
         cost: returns the costs (n,) of proposals (n, d).
         space: the box, as an optimiser knows it.
@@ -128,21 +132,21 @@ class Problem:
         noisy: returns the noisy costs (n,) that a call returns, from the proposals
             (n, d) and the number of evaluations before them. By default a call returns
             `cost`. The best and the trace are always of `cost`.
-        targets: costs to be reached, falling.
+        targets: costs to be reached, in descending order.
         id: names the problem in messages.
 
-    A problem also has the attributes of its cost function, such as `problem.decode` in
-    a frame and `problem.look` in a suite. Attributes have the same names as in COCO's
-    problems, if these have them.
+    Raises:
+        InputError: the budget is not a whole number above 0.
 
-    >>> import numpy as np
-    >>> from posefit.testing.toy import Toy, sphere
-    >>> problem = Problem(sphere, Toy(2), budget=3)
-    >>> problem(np.array([[0.3, 0.3], [1.0, 0.3]])).round(6).tolist()
-    [0.0, 12.25]
-    >>> problem.best.tolist(), problem.best_cost, problem.evaluations
-    ([0.3, 0.3], 0.0, 2)
-
+    Example:
+        >>> import numpy as np
+        >>> from posefit import Problem
+        >>> from posefit.testing.toy import Toy, sphere
+        >>> problem = Problem(sphere, Toy(2), budget=3)
+        >>> problem(np.array([[0.3, 0.3], [1.0, 0.3]])).round(6).tolist()
+        [0.0, 12.25]
+        >>> problem.best.tolist(), problem.best_cost, problem.evaluations
+        ([0.3, 0.3], 0.0, 2)
     """
 
     number_of_objectives = 1
@@ -188,7 +192,7 @@ class Problem:
         Raises:
             ValueError: the shape is wrong, or a number is not finite. Nothing is
                 counted.
-            BudgetSpentError: the budget does not hold all proposals. Nothing is
+            BudgetSpentError: there are more proposals than evaluations left. Nothing is
                 evaluated.
 
         """
@@ -270,8 +274,8 @@ class Problem:
         """
         if not self._falls:
             raise InputError(
-                f"{self.id} must have been evaluated,"
-                f" got {self.evaluations} evaluations and no cost"
+                f"{self.id} must have a finite cost before it has a best proposal,"
+                f" got none in {self.evaluations} evaluations"
             )
         return self._falls[-1][2].copy()
 

@@ -1,7 +1,7 @@
 """A race of modes: short searches from several starts, then long ones from the best.
 
-The weights tell which starts are worth a short search, and the costs after it which are
-worth the rest of the budget. Each search is a problem; together they have the budget of
+The weights decide which starts get a short search, and the costs after it which of them
+get the rest of the budget. Each search is a problem; together they have the budget of
 one.
 """
 

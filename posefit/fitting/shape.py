@@ -144,10 +144,10 @@ COVARIANCE = _covariance()
 SPREAD = np.sqrt(np.diag(COVARIANCE))
 FITTED_COVARIANCE = _without_ratio(COVARIANCE)
 PRECISION = np.linalg.inv(FITTED_COVARIANCE)
-# Error of lengths that stays when contours agree, because people are not cones. It is
+# Error of lengths that remains when contours agree, because people are not cones. It is
 # about the least error with four cameras of people with different radii on each bone,
-# 2.0 to 3.5 % on average (docs/studies/builds.py). A thigh and a shank, of whose sum
-# the fit knows, are each off by half of their ratio, too.
+# 2.0 to 3.5 % on average (docs/studies/builds.py). The fit determines only the sum of a
+# thigh and a shank, so each is also off by half of their ratio.
 _CONES_SPREAD = np.array([0.0, *[0.03] * len(LENGTHS), *[0.0] * len(GIRTHS)])
 _HALF_RATIO_SPREAD = 0.5 * np.sqrt(_RATIO @ COVARIANCE @ _RATIO)
 MODEL_SPREAD = np.hypot(_CONES_SPREAD, _HALF_RATIO_SPREAD * np.abs(_RATIO))

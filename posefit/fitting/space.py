@@ -45,6 +45,10 @@ class SearchSpace:
         tilt: The learned pitch and roll, or None for a box around `root_centre`.
         root_order: The order of the root's rotations.
 
+    Raises:
+        InputError: A range or a name is wrong, or a learned tilt is combined with the
+            root order "xyz".
+
     Example:
         >>> import numpy as np
         >>> import posefit

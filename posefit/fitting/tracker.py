@@ -42,7 +42,7 @@ SPREAD = 1.0
 FLOOR = 0.05
 HISTORY_FRAMES = 3  # frames that a prediction looks back
 TILT_SHARE = 0.99  # ours: the search covers the tilts of this share of training poses
-TILT_MARGIN_DEGREES = 5.0  # ours: about the difference between people's ways to stand
+TILT_MARGIN_DEGREES = 5.0  # ours: about the difference between people who stand
 RELOCALISE_GAP = 5  # frames without the person, about a sixth of a second. Ours
 # Key in the details of a frame: the coordinates (d,) of its pose in the search space.
 COORDINATES = "coordinates"
@@ -54,6 +54,19 @@ MIN_GUESSED_EVALUATIONS = 100
 class Observation:
     """The evidence of one frame: one silhouette per camera, and what else is known.
 
+    Attributes:
+        silhouettes: One for each camera.
+        translation: The position (3,) of the root in metres, or None if unknown.
+        usable: False if the frame shows too little of the person. A tracker then
+            repeats its last pose.
+        yaw: Roughly the direction in which the person faces, in radians, or None if
+            unknown.
+        landmarks: Column and row in pixels, and confidence, of each joint in each view
+            (views, 27, 3). The confidence is 0 to 1, and 0 for an unknown joint. None
+            without a detector of joints.
+        estimate: The pose (66,) and the root (3,) in metres of an earlier track, which
+            a tracker may consider; or None.
+
     Example:
         >>> import numpy as np
         >>> from posefit import Observation, Silhouette
@@ -62,15 +75,10 @@ class Observation:
     """
 
     silhouettes: Sequence[Silhouette] = field(repr=False)
-    translation: Array | None = None  # (3,) metres, the root, or None if unknown
-    # False: the frame shows too little of the person, and a tracker holds its pose
+    translation: Array | None = None  # (3,)
     usable: bool = True
-    # radians, roughly the way that the person faces, or None if unknown
     yaw: float | None = None
-    # (V, 27, 3) column and row of each joint in pixels, and confidence, 0 to 1, 0 for
-    # an unknown joint; None without a detector
-    landmarks: Array | None = field(default=None, repr=False)
-    # the pose (66,) and the root (3,) in metres of an earlier track, a candidate
+    landmarks: Array | None = field(default=None, repr=False)  # (views, 27, 3)
     estimate: tuple[Array, Array] | None = field(default=None, repr=False)
 
 
@@ -78,7 +86,27 @@ class Observation:
 class Frame:
     """The estimate of a tracker in one frame.
 
-    The loop that drives the tracker measures the time.
+    Attributes:
+        pose: The pose (66,) in radians.
+        translation: The position (3,) of the root in metres.
+        cost: The cost of the pose, 0 to 100.
+        areas: R, B, Y (views, 3) of the pose, in pixels, as `areas` counts them.
+        evaluations: The number of poses that were evaluated for the frame.
+        trace: The evaluations at which the cost fell, and the last one, each with the
+            best cost (k, 2).
+        posterior: The distribution of poses, or None if the tracker reports none.
+        lost: The probability that the tracker has lost the person, or None if it
+            reports none.
+        activity: What the person does, such as "walk", or None if the tracker does not
+            report it.
+        details: Anything else that the tracker reports.
+        seconds: Wall-clock time of the frame. A tracker leaves it at 0: the loop that
+            drives it measures the time.
+        cpu_seconds: CPU time of all threads, measured by the same loop. It does not
+            grow on a busy machine.
+
+    Raises:
+        InputError: `lost` is not in 0 to 1.
 
     Example:
         >>> import numpy as np
@@ -90,22 +118,18 @@ class Frame:
     """
 
     pose: Array = field(repr=False)  # (66,)
-    translation: Array  # (3,) metres
+    translation: Array  # (3,)
     cost: float
-    areas: Areas = field(repr=False)  # (views, 3): R, B, Y
+    areas: Areas = field(repr=False)  # (views, 3)
     evaluations: int
-    # (k, 2) evaluations at which the cost fell, and the last one, with the best cost
-    trace: Array = field(default_factory=lambda: np.empty((0, 2)), repr=False)
-    # the distribution of poses, or None if the tracker reports none
+    trace: Array = field(  # (k, 2)
+        default_factory=lambda: np.empty((0, 2)), repr=False
+    )
     posterior: Posterior | None = field(default=None, repr=False)
-    # probability that the frame is lost, or None if the tracker reports none
     lost: float | None = None
-    # the activity of the person, such as "walk", or None if the tracker reports none
     activity: str | None = None
-    # anything else that the tracker reports
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)
     seconds: float = 0.0
-    # CPU time of all threads; unlike `seconds` it does not grow on a busy machine
     cpu_seconds: float = 0.0
 
     @property
@@ -122,7 +146,33 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """The knowledge of a tracker before the first frame.
+    """What a tracker knows before the first frame.
+
+    Attributes:
+        body: The person's body.
+        cameras: One or several.
+        evaluations: The budget of a frame.
+        yaw: Roughly the direction in which the person faces in the first frame, in
+            radians, or None if unknown.
+        anchor: Roughly the position (3,) of the root in the first frame, in metres. It
+            is used if the observations do not have it.
+        translation: Whether the position is "known", "searched" or "aligned".
+            Interpretation S4.
+        fps: Frames per second.
+        training: Motions to learn from. Their angles are expressed about the axes of
+            the body's skeleton; the rotations in space are the same.
+        first_pose: The joint angles (63,) in the first frame, or None if unknown.
+        modes: Guessed modes of the first frame with their weights, see
+            `posefit.fitting.start`.
+        start: Builds the initialiser that guesses the modes, or None for a search
+            without a guess.
+        before: The earlier frames of a track that is continued.
+        resumable: Whether frames keep the state of a filter, so that another process
+            can continue the track.
+        threads: Number of threads. Does not change the result.
+        backwards: Whether observations and training are in reverse order.
+        fastest_turn: The fastest turn of the yaw, in radians a second, or None if
+            unknown.
 
     Example:
         >>> from posefit import Body, Camera, Task, load_motion
@@ -138,36 +188,22 @@ class Task:
 
     body: Body
     cameras: Sequence[Camera]
-    evaluations: int  # the budget of a frame
-    # radians, roughly the way that the person faces in the first frame; None: unknown
+    evaluations: int
     yaw: float | None
-    # (3,) metres, roughly the root in the first frame, unless observations have it
-    anchor: Array
-    translation: Translation = "known"  # Interpretation S4
+    anchor: Array  # (3,)
+    translation: Translation = "known"
     fps: float = 30.0
-    # motions to learn from
     training: Sequence[Motion] = field(default=(), repr=False)
-    # (63,) joint angles in the first frame, or None if they are unknown
-    first_pose: Array | None = None
-    # guessed modes of the first frame with their weights, see `posefit.fitting.start`
+    first_pose: Array | None = None  # (63,)
     modes: Sequence[tuple[float, Posterior]] = field(default=(), repr=False)
-    # builds what guesses the modes; None for a blind search
     start: "InitialiserFactory | None" = field(default=None, repr=False)
-    # earlier frames of a track that is continued
     before: Sequence[Frame] = field(default=(), repr=False)
-    # whether frames hold the state of a filter, so that another process can continue
     resumable: bool = False
     threads: int = 1
-    # whether observations and training come in reverse, the last one first
     backwards: bool = False
-    # radians a second, the fastest turn of the yaw, or None if unknown
     fastest_turn: float | None = None
 
     def __post_init__(self) -> None:
-        """Express training angles about the axes of the body's skeleton.
-
-        The rotations in space stay the same.
-        """
         training = [
             motion.about_axes_of(self.body.skeleton) for motion in self.training
         ]
@@ -180,10 +216,10 @@ class Task:
 
 
 class Tracker(Protocol):
-    """Follows a person through a sequence; nothing to inherit.
+    """Follows a person through a sequence.
 
-    It takes one observation before it yields a frame, unless it is registered with
-    `looks_ahead`.
+    A class need not inherit from it: this method makes it a tracker. It takes one
+    observation before it yields a frame, unless it is registered with `looks_ahead`.
 
     Example:
         >>> import numpy as np
@@ -218,7 +254,9 @@ Follow = Callable[[Task, Iterable[Observation], np.random.Generator], Iterator[F
 
 
 class Initialiser(Protocol):
-    """Guesses which poses an observation may show; nothing to inherit.
+    """Guesses which poses an observation may show.
+
+    A class need not inherit from it: this method makes it an initialiser.
 
     Example:
         >>> from posefit.plugin import Posterior
@@ -250,7 +288,7 @@ def guessed_modes(
 ) -> Sequence[tuple[float, Posterior]]:
     """Return the guessed modes of the poses that an observation may show.
 
-    There are none if the pose is known, if the task has nothing that guesses, or if the
+    There are none if the pose is known, if the task has no initialiser, or if the
     budget is so small that the search needs all of it.
     """
     if task.start is None or task.first_pose is not None or not observation.usable:
@@ -326,7 +364,7 @@ class Predictor:
         task: The task.
         prior: The fitted prior.
         prediction: The settings.
-        tilt: The tilt, if it was learned from the task's training before.
+        tilt: The tilt, if it has been learned from the task's training already.
 
     """
 
@@ -469,8 +507,16 @@ class Predictor:
 class SynthesisTracker:
     """Follows a person by one search per frame, around a prediction. SAPSO section 4.
 
-    `make` builds an optimiser from a space, a generator and the evaluations of its
-    search. `next_frame` tells what becomes of it in the next frame.
+    Attributes:
+        task: What is known before the first frame.
+        prior: The fitted prior.
+        make: Builds an optimiser from a space, a generator and the number of
+            evaluations of its search.
+        next_frame: What happens to the optimiser in the next frame: a new one gets the
+            predicted "start", the same one is kept ("carry"), or a new one searches
+            without a start ("forget").
+        prediction: The box of a search, its start, and the cost of a pose.
+        tilt: The tilt, if it has been learned from the prior and the training already.
 
     Example:
         >>> import numpy as np
@@ -493,7 +539,6 @@ class SynthesisTracker:
     make: OptimiserMaker
     next_frame: NextFrame = "start"
     prediction: Prediction = field(default_factory=Prediction)
-    # the tilt, if it was learned from the prior and the training before
     tilt: Tilt | None = field(default=None, repr=False)
 
     def track(
@@ -610,7 +655,7 @@ def _frame(
     If several modes were searched, they are its posterior.
     """
     poses, translations = best.decode(best.best[None])
-    # rasterising the result again is no evaluation
+    # rasterising the result again is not an evaluation
     with uncounted():
         areas = best.cost_and_areas(poses, translations)[1][:, 0]
     evaluations = guess_evaluations
@@ -618,7 +663,7 @@ def _frame(
         for problem in problems:
             evaluations += problem.evaluations
     used, costs = best.trace
-    # the trace of the best search, as if it came after all others
+    # the trace of the best search, as if it had been the last
     trace = np.column_stack([used + (evaluations - best.evaluations), costs])
     return Frame(
         poses[0],

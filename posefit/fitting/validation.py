@@ -41,7 +41,7 @@ class Checked:
         plugin: The optimiser or the fitted prior.
         name: Its name.
         space: The space that an optimiser searches, or None for a prior.
-        evaluations: The budget of a search. It must hold the first population.
+        evaluations: The budget of a search. It must be enough for the first population.
 
     """
 
@@ -73,8 +73,10 @@ class Checked:
                 rule = "return a first population of one proposal or more, got none"
                 raise BrokenRuleError(f"{self.name}: ask must {rule}")
             if self._evaluations is not None and count > self._evaluations:
-                rule = f"hold one population of {count}, got {self._evaluations}"
-                raise BudgetError(f"{self.name}: evaluations must {rule}")
+                raise BudgetError(
+                    f"{self.name}: evaluations must be at least {count}, "
+                    f"one population, got {self._evaluations}"
+                )
         return proposals
 
     def tell(self, proposals: Array, costs: Array) -> None:

@@ -11,7 +11,8 @@ MAX_LOG_ODDS = 30.0  # ours: beyond it a probability would be 0 or 1
 def weigh(costs: Array, sharpness: float) -> Array:
     """Return the weights (n,), exp(-sharpness cost), which sum to 1.
 
-    A cost that is nan or infinite weighs nothing. If all are, all weigh the same.
+    A cost that is nan or infinite gets the weight 0. If all costs are, all weights are
+    equal.
 
     Args:
         costs: The costs (n,).
@@ -38,9 +39,9 @@ def weigh(costs: Array, sharpness: float) -> Array:
 
 
 def effective_sample_size(weights: Array) -> float:
-    """Return the number of equal weights that are worth as much as these (n,).
+    """Return the effective number of samples of weights (n,), which sum to 1.
 
-    It is 1 over the sum of their squares, if they sum to 1.
+    It is 1 over the sum of their squares: n if all are equal, 1 if one is all.
 
     Args:
         weights: The weights (n,).

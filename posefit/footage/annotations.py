@@ -153,8 +153,8 @@ class _Content:
         self._check_pixels()
         if any(crowd for shapes in self.shapes.values() for _, crowd in shapes):
             self.guesses.append(
-                f"{self._path}: what is marked iscrowd is unknown where an image has "
-                "other people, else a person"
+                f"{self._path}: regions marked iscrowd are unknown in images with "
+                "other people, and are people in all other images"
             )
 
     def _check_images(self) -> None:
@@ -189,7 +189,7 @@ class _Content:
         if largest > 0.0:
             raise self._error(
                 f"polygons in pixels, got corners up to {largest:g}, which seem to be "
-                "shares of the picture's sides"
+                "fractions of the picture's size"
             )
 
     def _error(self, expected: str) -> InputError:
@@ -280,7 +280,7 @@ class _Content:
 
 
 def _key(value: Any) -> Any:
-    """Return a whole number or a name, whatever else a file may have there."""
+    """Return a whole number or a name, or None for any other value of a file."""
     if isinstance(value, float) and value.is_integer():
         return int(value)
     return value if isinstance(value, int | str) else None

@@ -63,7 +63,8 @@ def combined(
         guesses.append(f"{rate:g} frames a second")
     if not known:
         guesses.append(
-            "a level camera, 40 degrees across: distances and sizes are as good as that"
+            "a level camera, 40 degrees across: distances and sizes are only as good "
+            "as this guess"
         )
     world, metres, of_cameras = world_of(known, options.up, options.unit)
     cameras, views, notes = _straightened(views, known, world, metres)

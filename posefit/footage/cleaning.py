@@ -33,7 +33,7 @@ def cleaned(
 ) -> View:
     """Return the view of one person, from masks that another tool made.
 
-    Frames become unusable if they show no person before a background, or if the
+    Frames become unusable if they show no person against a background, or if the
     picture's edge cuts off most of the person. Other people's pixels become unknown.
 
     Args:
@@ -51,8 +51,8 @@ def cleaned(
     inverted = _is_inverted(view)
     if inverted:
         warnings.append(
-            f"{view.name}: most of the border is marked, so that the masks seem "
-            "inverted: they are turned round"
+            f"{view.name}: the masks cover most of the picture's border, so they seem "
+            "to be inverted, and are inverted back"
         )
     if holes is None:
         holes = MAX_HOLE_AREA if count > 1 else MAX_HOLE_ALONE
@@ -105,8 +105,7 @@ def _no_person(view: View) -> InputError:
     came = "one without background" if view.bits[0].any() else "an empty one"
     rest = f" first, and no other in {count}" if count > 1 else ""
     return InputError(
-        f"{view.name}: expected a mask with a person before a background, "
-        f"got {came}{rest}"
+        f"{view.name}: expected a mask with a person and a background, got {came}{rest}"
     )
 
 

@@ -1,4 +1,4 @@
-"""Refuse a film soon if the picture's border cuts the person in all of its frames.
+"""Refuse a film early if the picture's border cuts the person in all of its frames.
 
 `quality.verdict` refuses such a film, too, but only after all of its frames.
 """
@@ -20,7 +20,8 @@ from posefit.silhouette.pieces import RIVAL_AREA
 
 # a person who is cut in all frames for this long may be cut in the others, too
 CUT_SECONDS = 2.0
-# frames between those looked at: a person who is whole in fewer is hardly worth it
+# every how many frames to look at: if a person is whole in fewer frames than this, a
+# track is too short to be useful
 LOOK_STEP = MIN_DETECTIONS
 
 

@@ -30,7 +30,7 @@ def device_of(name: str) -> Device | None:
 
 
 def moved_to(silhouette: Silhouette, device: str) -> Silhouette:
-    """Move a silhouette to a device, which rasterises the poses compared with it.
+    """Return a silhouette on a device, which rasterises the poses compared with it.
 
     Args:
         silhouette: The silhouette of one view.
@@ -43,11 +43,12 @@ def moved_to(silhouette: Silhouette, device: str) -> Silhouette:
         InputError: No plugin offers the device, or this machine does not have it.
         ImportError: The plugin needs a library that is not installed.
 
-    >>> import numpy as np
-    >>> silhouette = Silhouette.of(np.ones((4, 4)))
-    >>> moved_to(silhouette, "cpu") is silhouette
-    True
-
+    Example:
+        >>> import numpy as np
+        >>> from posefit import Silhouette, moved_to
+        >>> silhouette = Silhouette.of(np.ones((4, 4)))
+        >>> moved_to(silhouette, "cpu") is silhouette
+        True
     """
     return _moved(silhouette, device_of(device))
 

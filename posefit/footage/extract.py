@@ -46,7 +46,7 @@ def extract(
 ) -> dict[str, Any]:
     """Write the masks of one person to a new folder, with a preview and a report.
 
-    masks.npz holds `masks` and `valid` (T, height, width), `usable` (T,), `first`, the
+    masks.npz has `masks` and `valid` (T, height, width), `usable` (T,), `first`, the
     number of the first frame, `fps` if it is known, and `landmarks` (T, 27, 3) if the
     segmenter reports any, see `Segmenter`. quality.csv compares the masks of a film
     with its pictures. Several cameras are written to the folders 1, 2 and so on.
@@ -58,7 +58,7 @@ def extract(
         out: The folder, which must not exist.
         how: How to segment the person in a film.
         frames: First frame, and the frame after the last.
-        progress: Shows how far a film is.
+        progress: Shows the progress of each film.
 
     Returns:
         The summary; for several cameras, a list of summaries as `cameras`.

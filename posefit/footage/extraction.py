@@ -1,4 +1,4 @@
-"""How a user wants the person to be segmented in a video."""
+"""Options for the segmentation of the person in a video."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace

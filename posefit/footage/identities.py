@@ -40,7 +40,7 @@ def with_identities(
         all_people: A pass by the second segmenter, which finds all people.
         single: A pass by the segmenter that reports one person only.
         scan: What that pass found.
-        progress: Shows how far further passes are.
+        progress: Shows the progress of further passes.
 
     Returns:
         A scan that follows the person whom the user chose. By default this is the first
@@ -105,7 +105,7 @@ def _without_others(
         single: The pass by the segmenter that reports one person only.
         parts: The parts of the person who is followed.
         others: The parts of all other people.
-        progress: Shows how far the pass is.
+        progress: Shows the progress of the pass.
 
     """
 

@@ -17,7 +17,7 @@ from posefit.footage.views import MOST
 from posefit.reading import check_size
 
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".gif", ".webp")
-PAGED = (".tif", ".tiff", ".gif", ".webp")  # may hold several pictures
+PAGED = (".tif", ".tiff", ".gif", ".webp")  # may contain several pictures
 # most pixels of a picture or a frame of video; 8K has 33 million
 PIXELS = 50_000_000
 # most bytes of a picture: as many as 16 bits for each of four channels
@@ -91,7 +91,7 @@ def read_marks(
 
 
 def page_count(path: Path) -> int:
-    """Return how many pictures a file holds; 1 if it is not a picture."""
+    """Return how many pictures a file contains; 1 if it is not a picture."""
     if path.suffix.lower() not in PAGED:
         return 1
     return next(_decoded(path, [0], _frame_count), 1)

@@ -46,7 +46,7 @@ class _Unread(NamedTuple):
     """Suffixes that users may well try, but that posefit does not read."""
 
     suffixes: Sequence[str]
-    what: str  # what such files hold
+    what: str  # what such files contain
     instead: str  # what posefit reads instead
 
 
@@ -71,7 +71,7 @@ UNREAD = (
         f"and motions as {' and '.join(MOTIONS)}",
     ),
 )
-# what a source holds: a motion, masks, a video file, or pictures of a film
+# what a source contains: a motion, masks, a video file, or pictures of a film
 Medium = Literal["motion", "masks", "video", "pictures"]
 # where a source is, by `_place`: images are listed, and other names are not opened
 Place = Motion | str | Path | Images | NDArray[Any]

@@ -157,7 +157,7 @@ def netpbm_images(stream: BinaryIO) -> Iterator[Image]:
         yield image if is_grey else np.ascontiguousarray(image[..., ::-1])
 
 
-MAX_DIGITS = 10  # more digits are no number of pixels: the header is damaged
+MAX_DIGITS = 10  # a number of pixels has no more: the header is damaged
 
 
 def _number(stream: BinaryIO) -> int:

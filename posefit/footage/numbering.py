@@ -251,8 +251,8 @@ def _guess_order(listed: list[Numbered], names: Sequence[str]) -> None:
     for k, view in enumerate(listed):
         if len(view.files) > 1:
             in_order = (
-                f"images of {' and '.join(names)} are of one moment in the order in "
-                "which they come, as not all of their names count frames"
+                f"images of {' and '.join(names)} are paired in the order of their "
+                "names, because not all of these contain the number of a frame"
             )
             listed[k] = view._replace(guesses=[*view.guesses, in_order])
             return

@@ -22,7 +22,7 @@ def listed(
 ) -> list[Camera | Calibration]:
     """Return cameras, after reading those that are files.
 
-    A file may hold several cameras, which are for several views in their order. Raises
+    A file may have several cameras, which are for several views in their order. Raises
     InputError if a file is not a calibration.
     """
     known = list[Camera | Calibration]()
@@ -112,7 +112,7 @@ def _check_places(cameras: Sequence[Camera | Calibration]) -> None:
         for other_place, other_name in earlier:
             if other_place == place.tobytes():
                 raise InputError(
-                    "cameras must stand at different places, got one place and one "
+                    "cameras must be in different places, got the same place and "
                     f"direction for {other_name} and {name}"
                 )
         earlier.append((place.tobytes(), name))

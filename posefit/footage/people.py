@@ -170,7 +170,7 @@ class Tracklet:
 
     @property
     def _frames(self) -> int:
-        """How many frames show the person, if judged then only usable ones."""
+        """How many frames show the person; if judged, only usable ones count."""
         return self._usable if self.rows else self.alone
 
     @property

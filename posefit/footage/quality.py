@@ -37,8 +37,8 @@ MOTION_REACH = 0.5
 # per video
 # the segmenter that needs no background, for a person who is always in the picture
 PEOPLE_SEGMENTER = "mediapipe"
-# share of the moving pixels outside the masks, as a median over frames: with more, the
-# masks are not the person
+# share of the moving pixels outside the masks, as a median over frames: above it, the
+# masks do not show the person
 UNEXPLAINED_SHARE = 0.3
 # shares by which the longer side and the area change from frame to frame: the masks are
 # unsteady if more than one frame in ten changes more
@@ -59,7 +59,7 @@ class Changes:
     def between(self, earlier: tuple[int, Image], now: tuple[int, Image]) -> Mask:
         """Return `changed_pixels` of two frames, given by their numbers and pictures.
 
-        A number stands for one picture only.
+        A number must always have the same picture.
         """
         frames = earlier[0], now[0]
         if self._changed is None or frames != self._frames:

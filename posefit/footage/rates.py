@@ -52,7 +52,7 @@ def even(times: Array, fps: float) -> tuple[Order, NDArray[np.bool_], float]:
     later = np.clip(np.searchsorted(times, moments), 1, len(times) - 1)
     is_earlier_nearer = moments - times[later - 1] <= times[later] - moments
     order = np.where(is_earlier_nearer, later - 1, later)
-    # of several moments with one frame, the nearest is the one when it was filmed
+    # of several moments that show one frame, it was filmed at the nearest
     miss = np.abs(times[order] - moments)
     least = np.full(len(times), np.inf)
     np.minimum.at(least, order, miss)

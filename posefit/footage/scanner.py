@@ -76,7 +76,7 @@ class Scanner:
         """Return what each frame shows: the largest blob, and the people.
 
         Args:
-            progress: Shows how far the pass is.
+            progress: Shows the progress of the pass.
             changed: Returns the picture of a frame that the segmenter gets, given the
                 frame's index and its picture.
             watch: Gets each frame's index and its people; it may end the pass.

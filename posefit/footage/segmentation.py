@@ -29,7 +29,7 @@ class _Followed(NamedTuple):
     """The person who is followed."""
 
     view: View
-    several: str  # what to say if there are several people
+    several: str  # the message if there are several people
     rows: list[dict[str, Any]]  # of quality.csv, for each frame
     apart: list[dict[str, Any]]  # the rows of frames in which others do not overlap
 
@@ -82,7 +82,7 @@ class Segmentation:
         """Segment the video, after the background was learned.
 
         Args:
-            progress: Shows how far the pass is.
+            progress: Shows the progress of the pass.
             choose: Returns the number of the person to follow, instead of the
                 extraction's `person`.
             refuse_cut: Whether to stop soon if the picture cuts the person in all

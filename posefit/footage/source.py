@@ -49,7 +49,7 @@ def scene_of(
     Args:
         source: As for `resolve`, or its result.
         options: Its cameras, its person, and how it is read.
-        progress: Shows how far reading is.
+        progress: Shows the progress of reading.
 
     Returns:
         The scene, whose guesses are logged.
@@ -230,7 +230,7 @@ def _of_films(
         attempts.append(attempt)
         if not attempt.doubt:
             break
-    # doubtful masks are better than none, and of equals the first segmenter's
+    # doubtful masks are better than none; of equals, take the first segmenter's
     best = min(attempts, key=lambda each: (each.scene is None, bool(each.doubt)))
     if best.scene is None:
         raise NoPersonError(best.doubt)

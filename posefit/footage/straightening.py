@@ -71,7 +71,7 @@ def undistorted(
         valid = silhouette.valid.astype(np.uint8)
         share = cv2.remap(levels, *maps, cv2.INTER_LINEAR)
         covered = cv2.remap(valid, *maps, cv2.INTER_NEAREST)
-        # interpolated between four pixels, the outline is where half of them are person
+        # interpolated between four pixels, the outline is where the person has a half
         bits[k] = np.packbits(share > 127)
         known[k] = np.packbits(covered != 0)
     landmarks = view.landmarks
@@ -137,7 +137,7 @@ def _resized(calibration: Calibration, size: tuple[int, int]) -> str:
     came = f"{size[0]}x{size[1]}"
     change = f"is scaled to {came}"
     if calibration.padded(size) is not None:
-        change = f"holds for {came}, with rows or columns more or less at the end"
+        change = f"is used for {came}, with more or fewer rows or columns at the end"
     name = f" {quoted(calibration.name)}" if calibration.name else ""
     return f"the calibration{name} of {width}x{height} {change}"
 

@@ -25,7 +25,7 @@ SCALES = (1.0, 255.0, 65_535.0)  # values of a pixel that is entirely the person
 PERCENT = 100.0
 # times a scale: resampled soft masks overshoot it a little
 NEAR_SCALE = 1.25
-# share of the highest value, if that is no usual scale: resampled soft masks undershoot
+# share of the highest value, unless that is a usual scale: resampled masks undershoot
 # 0 by at most this much
 RINGING = 0.1
 # (height, width): grey levels, an alpha channel, palette indices, or colours 0xRRGGBB
@@ -173,13 +173,13 @@ class ValueCounts:
             return float(self.highest // 2), "translucent"
         # fractions that fit no usual scale: above 1, and far below 255
         if self.fractions and NEAR_SCALE < self.highest < SCALES[1] / 4.0:
-            return self.highest / 2.0, "degrees"
+            return self.highest / 2.0, "confidences"
         # on the scale of 255, no pixel would be more than half person
         if 0.5 * PERCENT < self.highest <= NEAR_SCALE * PERCENT:
             return 0.5 * PERCENT, "percentages"
         scales = [scale for scale in SCALES if self.highest <= NEAR_SCALE * scale]
         full = scales[0] if scales else self.highest
-        return (0.5 if full == 1.0 else float(full // 2)), "degrees"
+        return (0.5 if full == 1.0 else float(full // 2)), "confidences"
 
     def _listed(self, labels: Sequence[float]) -> str:
         """Return labels for a message, shortened; colours as hexadecimal numbers."""
@@ -202,7 +202,7 @@ def _of_two(values: Sequence[float]) -> tuple[float, bool]:
 
 
 def above(threshold: float) -> Classifier:
-    """Return the classifier by which what is above a threshold is the person."""
+    """Return the classifier for which values above a threshold are the person."""
     return lambda values: np.asarray(values > threshold)
 
 
@@ -211,7 +211,7 @@ def _between(threshold: float, most: float) -> Classifier:
 
 
 def many_colours(name: object) -> InputError:
-    """Return the error for pictures in many colours, which are no masks."""
+    """Return the error for pictures in many colours, which are not masks."""
     return InputError(
         f"{name}: expected masks, got pictures in many colours: "
         "make masks of the person, or cut them out with an alpha channel"

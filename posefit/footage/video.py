@@ -87,27 +87,27 @@ class Video:
         warnings = []
         if head.aspect is not None and abs(head.aspect - 1.0) > SQUARE_SHARE:
             warnings.append(
-                f"{path}: its pixels are {head.aspect:.3g} times as wide as high, "
-                "which is not corrected: the person looks that much too slim"
+                f"{path}: its pixels are {head.aspect:.3g} times as wide as high. This "
+                "is not corrected, so the person looks too slim by this factor"
             )
         if is_uneven:
             held = np.count_nonzero(~filmed)
             warnings.append(
-                f"{path}: its frames come at uneven times; it is sampled {rate:.3g} "
-                f"times a second, so that {held} of {len(order)} frames stand for "
-                "moments without a filmed one, and are held"
+                f"{path}: its frames come at uneven times, so it is sampled {rate:.3g} "
+                f"times a second; {held} of these {len(order)} frames were not filmed, "
+                "and are held"
             )
         guesses = []
         by_times = rate != stated
         if not is_stated:
             reason = "which the file does not state"
             if by_times:
-                reason = "by its frames' times"
+                reason = "by the times of its frames"
             guesses.append(f"{path}: {rate:.4g} frames a second, {reason}")
         elif by_times and not is_uneven:
             guesses.append(
-                f"{path}: {rate:.4g} frames a second by its frames' times, where its "
-                f"head says {head.fps:.4g}"
+                f"{path}: {rate:.4g} frames a second by the times of its frames, "
+                f"although its header says {head.fps:.4g}"
             )
         # many files compute their number of frames from their length and their stated
         # rate, so that it counts nothing if that rate is wrong
@@ -286,9 +286,10 @@ class _Head(NamedTuple):
 
 def _read_head(path: Path) -> _Head:
     """Return what a video states about itself. Raises InputError if unreadable."""
+    if path.is_dir():
+        raise InputError(f"{path}: expected a video file, got a folder")
     if not path.is_file():
-        came = "a folder" if path.is_dir() else "nothing of that name"
-        raise InputError(f"{path}: expected a video file, got {came}")
+        raise InputError(f"{path}: no such file")
     _check_no_text(path)
     capture = cv2.VideoCapture(opencv_name(path))
     try:
@@ -384,7 +385,7 @@ def _bytes_of(size: tuple[int, int]) -> int:
 def _kept_at_first(head: _Head, size: tuple[int, int]) -> Container[int]:
     """Return the frames to keep when the file is opened: all that it states, or none.
 
-    Of a film that is too long, only frames that are needed later are worth the room.
+    If a film is too long, only frames that are needed later are kept.
     """
     fits = 0.0 < head.claimed * _bytes_of(size) <= ROOM
     return range(round(head.claimed)) if fits else ()
@@ -401,7 +402,7 @@ def _moments(
         path: The file.
         filmed: Width and height of its frames.
         size: Width and height to which they are scaled.
-        kept: Gets the frames that it wants.
+        kept: Chooses and keeps frames.
 
     """
     times = list[float]()

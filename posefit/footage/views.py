@@ -70,7 +70,7 @@ class View:
     doubt: str = ""  # what is wrong with the masks, if anything
     warnings: Sequence[str] = ()  # what a user should check before trusting the masks
     guesses: Sequence[str] = ()  # what the source does not state and posefit assumes
-    # yields the pictures, at the masks' size; None if the source holds masks only
+    # yields the pictures, at the masks' size; None if the source contains masks only
     pictures: Callable[[], Iterator[Image]] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
@@ -201,7 +201,7 @@ def border_of(planes: Planes, size: tuple[int, int]) -> NDArray[np.bool_]:
     width, height = size
     places = np.arange(width * height).reshape(height, width)
     border = np.concatenate([places[[0, -1]].ravel(), places[:, [0, -1]].ravel()])
-    octets = planes[:, border >> 3]  # (T, n): the byte that holds each pixel
+    octets = planes[:, border >> 3]  # (T, n): the byte that contains each pixel
     # `packbits` stores the first pixel in the highest bit
     shift = (7 - (border & 7)).astype(np.uint8)
     return np.asarray(octets >> shift & 1 > 0)
@@ -286,7 +286,7 @@ def known_planes(there: NDArray[np.bool_], size: tuple[int, int]) -> Planes | No
 
 
 def beyond(frames: Range, first: int, count: int) -> str:
-    """Return what to say if a range names frames that a source does not have, or "".
+    """Return a message if a range names frames that a source does not have, else "".
 
     Args:
         frames: The range, as for `span`.

@@ -63,7 +63,7 @@ def world_of(
     for calibration in calibrations:
         if calibration.rotation is None:
             guesses["place"] = (
-                "the camera stands level, which its calibration does not state"
+                "the camera is level, which its calibration does not state"
             )
         if calibration.size is None:
             guesses["size"] = (
@@ -78,8 +78,8 @@ def world_of(
             lowest = min(lowest, float(world[1] @ place))
     if lowest < -MAX_BELOW:
         guesses["below"] = (
-            f"a camera stands {-lowest:.1f} m below its world's origin: is its "
-            "translation its place?"
+            f"a camera is {-lowest:.1f} m below the origin of the world: is its "
+            "translation the camera's position?"
         )
     return world, metres, guesses
 
@@ -128,8 +128,8 @@ def unit_by_height(
     """Return the unit in which the person's height is about right.
 
     Args:
-        measured: The person's height by the factor that the lengths of calibrations
-            with an open unit are multiplied with.
+        measured: Measures the person, given the factor by which the lengths of
+            calibrations with an open unit are multiplied.
         known: The cameras. A calibration may state that it is in metres, or that its
             unit may be any length if no usual one fits.
         metres: The unit guessed before, in metres.

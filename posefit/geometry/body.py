@@ -46,6 +46,9 @@ class Body:
         skeleton: The skeleton.
         radii: The radii (26, 2) in metres, at the start and at the end of each bone.
 
+    Raises:
+        InputError: The radii have another shape, or one is negative or not finite.
+
     Example:
         >>> from posefit import Body, load_motion
         >>> body = Body.of(load_motion("walk").skeleton)

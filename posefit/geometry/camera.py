@@ -40,6 +40,10 @@ class Camera:
         rotation: The rotation (3, 3) from the world to the camera.
         translation: The translation (3,) in metres.
 
+    Raises:
+        InputError: A size, focal length or shape is wrong, or `rotation` is not a
+            rotation.
+
     Example:
         >>> from posefit import Camera
         >>> camera = Camera.pinhole(640, 480, fx=700)
@@ -204,7 +208,7 @@ class Camera:
         across = (np.abs(x) + radii) / free[0]  # (n,) metres of depth that are needed
         down = (np.abs(y) + radii) / free[1]
         needed = np.maximum(across, down) - z
-        # every ball stays at least half a metre before the camera
+        # every ball is at least half a metre in front of the camera
         clear = (radii - z).max() + 0.5
         return cls.around(target, azimuth, float(max(needed.max(), clear)), size)
 
@@ -226,8 +230,8 @@ class Camera:
     def squared(self) -> "Camera":
         """Return a camera of the same view with square pixels: this one if it has them.
 
-        The longer focal length holds in both directions, so that pictures get more
-        columns or more rows.
+        Both directions get the longer focal length, so that pictures have more columns
+        or more rows.
         """
         if self.square:
             return self

@@ -65,7 +65,7 @@ def shortest_turn(start: Array, end: Array) -> Array:
     cosine = (start * end).sum(axis=-1)
     sine = np.linalg.norm(cross, axis=-1)
     opposite = known & (sine <= 1e-12 * lengths) & (cosine < 0.0)
-    # opposite directions have no cross product: any axis at a right angle serves
+    # opposite directions have no cross product: any axis at a right angle will do
     perpendicular = along_y(np.where(known[..., None], start, 1.0))[..., 0]
     normal = cross / np.where(sine > 0.0, sine, 1.0)[..., None]
     axis = np.where(opposite[..., None], perpendicular, normal)

@@ -148,6 +148,10 @@ class Skeleton:
         limits: The lowest and the highest value (63, 2) in radians of each joint angle,
             0 for padding, or None if unknown.
 
+    Raises:
+        InputError: An array has another shape or is not finite, or a lowest angle is
+            above the highest.
+
     Example:
         >>> from posefit import load_motion
         >>> motion = load_motion("walk")

@@ -1,9 +1,9 @@
 """Poses with nearly the same silhouette: left and right exchanged, turned, reflected.
 
 A silhouette shows neither depth nor which leg is in front. A search that has chosen the
-wrong one of two such poses stays with it, because each frame continues the last, unless
-a tracker tries the other pose. These functions take poses (n, 66) and leave the roots
-where they are; applied twice, they give the original poses. The bones of the two sides
+wrong one of two such poses keeps it, because each frame continues the last, unless a
+tracker tries the other pose. These functions take poses (n, 66) and do not change the
+roots; applied twice, they give the original poses. The bones of the two sides
 are seldom equally long, so the silhouettes differ as much as the sides do.
 """
 
@@ -46,8 +46,8 @@ def mirrored_poses(skeleton: Skeleton, poses: Array) -> Array:
     """Return poses (n, 66) with left and right exchanged.
 
     A stride becomes the stride half a cycle later. The body is reflected in the upright
-    plane along which it faces, and each side takes the name of the other. Exactly from
-    the body's side the silhouette stays the same, because the camera looks across this
+    plane along which it faces, and each side takes the name of the other. Seen exactly
+    from the side, the silhouette does not change, because the camera looks across this
     plane and depth is invisible. The farther the camera is from there, the more the
     silhouette changes.
 
@@ -74,9 +74,9 @@ def mirrored_poses(skeleton: Skeleton, poses: Array) -> Array:
 def turned_poses(poses: Array) -> Array:
     """Return poses (n, 66) that face the opposite way, with the same joint angles.
 
-    From the front or from behind, an upright body at rest keeps its outline. A walking
-    body nearly keeps it, with left and right on the other sides. From the side, knees
-    and feet point the wrong way.
+    From the front or from behind, the outline of an upright body at rest is the same.
+    That of a walking body is nearly the same, with left and right exchanged. From the
+    side, knees and feet point the wrong way.
 
     Args:
         poses: The poses (n, 66).
@@ -130,7 +130,7 @@ def reflected_poses(skeleton: Skeleton, poses: Array, camera_yaw: float) -> Arra
 def exchanged_limbs(skeleton: Skeleton, poses: Array, limbs: Limbs) -> Array:
     """Return poses (n, 66) in which the two `legs`, or the two `arms`, are exchanged.
 
-    Each limb gets the mirrored angles of the other; the rest of the body stays. From
+    Each limb gets the mirrored angles of the other; the rest is not changed. From
     the side, the near and the far limb overlap or cross, and the silhouette is nearly
     the same whichever is in front.
 
@@ -141,6 +141,9 @@ def exchanged_limbs(skeleton: Skeleton, poses: Array, limbs: Limbs) -> Array:
 
     Returns:
         The poses (n, 66) with exchanged limbs.
+
+    Raises:
+        InputError: `limbs` is neither "legs" nor "arms".
 
     Example:
         >>> import numpy as np

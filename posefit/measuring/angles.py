@@ -23,7 +23,7 @@ MEANINGS = {
         "internal_rotation": "knee inwards",
     },
     "knee": {
-        "flexion": "heel to the seat",
+        "flexion": "heel towards the buttocks",
         "adduction": "shank inwards (varus)",
         "internal_rotation": "toes inwards",
     },
@@ -33,12 +33,12 @@ MEANINGS = {
         "internal_rotation": "toes inwards",
     },
     "shoulder": {
-        "plane": "of elevation: 0 sideways (abduction), 90 forwards (flexion)",
-        "elevation": "arm away from hanging, 0 to 180",
-        "internal_rotation": "of the arm about itself",
+        "plane": "plane of elevation: 0 sideways (abduction), 90 forwards (flexion)",
+        "elevation": "arm raised, 0 hanging to 180",
+        "internal_rotation": "arm turned inwards about its long axis",
     },
     "elbow": {
-        "flexion": "hand to the shoulder",
+        "flexion": "hand towards the shoulder",
         "adduction": "forearm inwards",
         "pronation": "palm backwards",
     },
@@ -126,9 +126,9 @@ def clinical_angles(skeleton: Skeleton, poses: Array) -> dict[str, Array]:
     """Return the clinical angles (T,) of poses in degrees, by the names of `COLUMNS`.
 
     Angles do not jump by whole turns from one pose to the next; most lie in -180 to
-    180. A joint's first and last angles are NaN within `NEAR_POLE` degrees of a pose in
-    which both are about the same axis, such as plane and rotation of a shoulder that
-    hangs or points straight up.
+    180. The first and the last angle of a joint are NaN within `NEAR_POLE` degrees of a
+    pose in which both turn about the same axis. For the plane and the rotation of a
+    shoulder, such poses are an arm that hangs straight down or points straight up.
 
     Args:
         skeleton: the skeleton.

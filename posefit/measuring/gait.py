@@ -3,8 +3,8 @@
 It also finds people who walk backwards. A step of a foot lasts from the other foot's
 strike to its own, a stride from one of its strikes to the next. A step or a stride
 counts if the feet strike in turn, if the person moves the way they face, and if every
-frame of it is known. If a person walks and stays in one place, as on a treadmill or
-before a camera that turns with them, only times count.
+frame of it is known. If a person walks in one place, as on a treadmill or in front of
+a camera that turns with them, only times count.
 """
 
 from collections.abc import Collection, Iterator, Sequence
@@ -30,16 +30,16 @@ MIN_STEPS_SHARE = 1.0 / 3.0  # least share of the known time that the steps last
 # metres between the lines on which the feet of a walk strike; in dancing or dodging it
 # is wider
 MAX_STEP_WIDTH = 0.35
-RUNNING_FROUDE = 0.5  # the Froude number from which people run rather than walk
+RUNNING_FROUDE = 0.5  # the Froude number above which people run rather than walk
 # share of a stride; judged by the rearmost toes, a runner's stance is shorter
 MIN_STANCE_SHARE = 0.57
 # ours: standard deviation over mean of strides in one place; a dance's differ more
 MAX_UNEVEN = 0.1
-# ours: greater than MIN_STEPS_SHARE, because other motions stay in one place, too
+# ours: greater than MIN_STEPS_SHARE, because other motions are in one place, too
 MIN_STEPS_SHARE_IN_PLACE = 0.5
 IN_PLACE = (
     "the person stays in one place: on the spot, on a treadmill, "
-    "or before a camera that turns with them"
+    "or in front of a camera that turns with them"
 )
 CYCLE = 101  # samples of a stride; the last is the first of the next stride
 GRAVITY = 9.81  # metres per second squared
@@ -412,7 +412,7 @@ def walks_backwards(motion: Motion, unknown: Collection[int] = ()) -> NDArray[np
     That direction is measured over the half second around a frame, on the ground, if
     all of it is known. A person slower than 0.3 m/s has none. A heading more than 90
     degrees from it faces away. Frames in a row in which the root moves by less than the
-    length of a leg are no walk: the hips of a person who squats go back, too.
+    length of a leg are not a walk: the hips of a person who squats move back, too.
 
     Args:
         motion: the motion.

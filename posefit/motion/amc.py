@@ -104,7 +104,7 @@ def read_amc(
     if first > 1:
         from_0 = "here its frames are numbered from 0"
         notes = (*notes, f"{path}: the file's first frame is number {first}: {from_0}")
-    # of the joints, as a root may turn round and round
+    # of the joints, because a root may make many turns
     if said := doubtful_angles(values[:, 6:], radians=radians):
         notes = (*notes, f"{path}: {said}")
     angles = values if radians else np.deg2rad(values)
@@ -217,7 +217,7 @@ def _frames(lines: Iterator[Line], spans: Spans, frame: int, name: str) -> Array
 
 
 def _frame_number(line: Line) -> int | None:
-    """Return the number on a line that holds only a number, or else None."""
+    """Return the number on a line that contains only a number, or else None."""
     word = line.key
     if len(line.words) != 1 or len(word) >= 10:
         return None
@@ -241,7 +241,7 @@ def write_amc(path: str | Path, motion: Motion) -> None:
     """Write a motion as an .amc file in the CMU database's unit.
 
     The file reads back as the same motion, up to whole turns. A comment states its
-    rate. Channels that a pose does not hold, such as fingers, are written as 0.
+    rate. Channels that a pose does not contain, such as fingers, are written as 0.
 
     Raises:
         InputError: the motion turns a joint about an axis for which the skeleton has no

@@ -90,7 +90,7 @@ def parse_asf(path: str | Path, unit: Unit | None = None) -> Acclaim:
         vectors.append(bones[name].vector)
         axes.append(bones[name].axis)
     channels = []
-    # of fingers, too: a motion's file has angles for them, and a pose has not
+    # of fingers, too: a motion's file has angles for them, and a pose has none
     for name, bone in bones.items():
         if bone.free:
             channels.append((name, bone.free))
@@ -137,7 +137,7 @@ def _limits(bones: dict[str, _Bone]) -> Array | None:
 
 
 def _sections(path: Path) -> dict[str, list[Line]]:
-    """Return the lines of each section. The first line holds the section's name."""
+    """Return the lines of each section. The first line contains the section's name."""
     sections: dict[str, list[Line]] = {}
     current: list[Line] | None = None
     for line in lines_of(path, SIZE_LIMIT):

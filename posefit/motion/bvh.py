@@ -2,7 +2,7 @@
 
 In a BVH file a joint's rotation turns everything that starts at the joint. In a
 `Skeleton` the angles named after a bone turn that bone about the joint it starts from.
-So a bone corresponds to the BVH joint at the bone's start: `LeftUpLeg` (the hip) holds
+So a bone corresponds to the BVH joint at the bone's start: `LeftUpLeg` (the hip) has
 the angles of `lfemur`, and the offset of its child `LeftLeg` (the knee) is that bone's
 vector. joint_names.py recognises joints by name; rig.py converts the motion to
 posefit's skeleton.

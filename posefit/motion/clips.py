@@ -102,7 +102,7 @@ def recorded_clip(clip: recorded.RecordedClip) -> SourceClip:
     )
 
 
-# holds the whole library at two rates: 40 MB
+# contains the whole library at two rates: 40 MB
 @lru_cache(maxsize=512)
 def _resampled(clip: recorded.RecordedClip, fps: float) -> Motion:
     return clip.motion().resampled(fps)
@@ -136,12 +136,12 @@ def load_motion(
         fps: frames per second.
         stated: information that the file lacks.
 
+    Returns:
+        The motion.
+
     Raises:
         InputError: there is no such motion, or unit or up is given for a source that is
             not a file.
-
-    Returns:
-        The motion.
 
     Example:
         >>> from posefit import load_motion
@@ -237,7 +237,7 @@ def _clips(
         clips = [clip for clip in recorded.named(source) if clip.name != stem]
         if not clips:
             raise InputError(
-                "train must hold a clip other than the source, "
+                "train must contain a clip other than the source, "
                 f"got {source} for {followed}"
             )
         for clip in clips:
@@ -250,7 +250,7 @@ def _clips(
         if not paths:
             raise InputError(
                 f"{source}: expected a folder of {' or '.join(MOTIONS)} files, "
-                "got none in it"
+                "got a folder without any"
             )
         others = [path for path in paths if not _same(path, followed)]
         if not others:

@@ -65,7 +65,7 @@ def write_glb(path: str | Path, motion: Motion, radii: Array) -> None:
     nodes.append({"name": "body", "mesh": 0, "skin": 0})
     at_rest = skeleton.joints(np.zeros(ANGLES))
     starts = at_rest[[0, *PARENTS[1:]]]
-    # no joint is turned at rest, so a shift leads from the world to it
+    # no joint is turned at rest, so the transform from the world is a translation
     binds = np.tile(np.eye(4), (body, 1, 1))
     binds[:, 3, :3] = -np.concatenate([starts, at_rest[[*ENDS]]])
     skin = {
@@ -227,14 +227,14 @@ class _Buffer:
 def _capped_cone(
     offset: Array, radii: Sequence[float] | Array
 ) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Return a cone with half balls at its ends: points, normals, triangles' corners.
+    """Return a cone with hemispheres at its ends: points, normals, triangles' corners.
 
     Points and normals have shape (n, 3), the corners (3 m,).
     """
     length = float(np.linalg.norm(offset))
     down = np.linspace(-0.5 * np.pi, 0.0, CAP)
     up = np.linspace(0.0, 0.5 * np.pi, CAP)
-    # the rings of both half balls: their latitudes, and the balls' radii and middles
+    # the rings of both hemispheres: their latitudes, and the balls' radii and centres
     latitudes = np.concatenate([down, up])
     ring_radii = np.repeat([radii[0], radii[1]], CAP)
     ring_middles = np.repeat([0.0, length], CAP)

@@ -65,7 +65,7 @@ class Motion:
             array = frozen(name, getattr(self, name), ("frames", columns))
             object.__setattr__(self, name, array)
         if len(self.poses) < 1:
-            raise InputError("poses must hold at least 1 frame, got 0")
+            raise InputError("poses must contain at least 1 frame, got 0")
         if len(self.translations) != len(self.poses):
             raise InputError(
                 f"translations must have shape {(len(self.poses), 3)}, "

@@ -1,6 +1,6 @@
 """The library of recorded motions: clips of ten people, so that you need no recordings.
 
-The people walk, run, jump, turn, dance, fight, sweep the floor, and play animals.
+The people walk, run, jump, turn, dance, fight, sweep the floor, and imitate animals.
 `docs/studies/make_library.py` made the file from clips of the CMU database. A clip
 keeps only the poses that interpolation needs to place every joint within about a
 centimetre. The data used in this project was obtained from mocap.cs.cmu.edu. The
@@ -186,7 +186,7 @@ def clips(
             chosen.append(clip)
     if not chosen:
         raise InputError(
-            "the library must keep at least one person, got all of them left out"
+            "at least one person of the library must remain, got all of them left out"
         )
     return chosen
 

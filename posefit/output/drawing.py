@@ -187,7 +187,7 @@ def draw_bones(
 def _cones(
     body: Body, camera: Camera, pose: Array, translation: Array
 ) -> Iterator[tuple[int, Array, Array, float]]:
-    """Yield the bones before a camera, far ones first.
+    """Yield the bones in front of a camera, far ones first.
 
     Each has its number, the pixels of its ends (2, 2), its radii there (2,), and its
     shade.

@@ -1,6 +1,6 @@
 """The output folder of a track, which appears under its name only when it is complete.
 
-Until then a hidden folder next to it holds the frames that were estimated so far. If
+Until then a hidden folder next to it contains the frames that were estimated so far. If
 a track is interrupted, because the disk is full or a user stops it, these frames are
 kept, and the same track can be resumed from them.
 """
@@ -41,7 +41,7 @@ _WRITTEN = (*FILES, RECORD, *CARRIED_FILES)
 
 
 class Recorder:
-    """Records the frames of a track as they come. This base class records nothing."""
+    """Records each frame of a track at once. This base class records nothing."""
 
     def __enter__(self) -> Self:
         return self

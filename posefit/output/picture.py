@@ -47,7 +47,7 @@ PANEL = 480  # pixels high
 # 8,191 pixels; wider pictures get a smaller height
 MAX_ASPECT = 4
 MIN_OVERLAY = 240  # pixels of width, so that the words fit
-# the colours of the background, mask only, body only, and both, as OpenCV wants them
+# the colours of the background, mask only, body only, and both, in OpenCV's order
 OVERLAP = np.zeros((256, 1, 3), dtype=np.uint8)
 OVERLAP[:4, 0] = [BACKGROUND, MISSED, SPILLED, BOTH]
 SUMMARY_STILLS = 6  # frames on the summary

@@ -1,6 +1,6 @@
 """The video, the summary and the page of a track, made in one pass through its footage.
 
-A picture that cannot be made costs a warning, and never the poses.
+If a picture cannot be made, a warning is given, and the poses are written all the same.
 """
 
 import errno
@@ -163,7 +163,7 @@ def _shown(
 ) -> Iterator[tuple[Frame, Observation, Image | None]]:
     """Yield each frame with its masks and its picture.
 
-    The picture is None if there is no footage, or from where it cannot be read on; a
+    The picture is None without footage, and from the frame at which reading fails; a
     warning is then added to `warnings`.
     """
     pictures = _pictures(content.scene, warnings)

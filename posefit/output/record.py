@@ -1,4 +1,4 @@
-"""The record of a track's frames as they come: one line per frame, with a checksum.
+"""The record of a track's frames so far: one line per frame, with a checksum.
 
 An interrupted track is resumed from it.
 """
@@ -73,7 +73,7 @@ def read_carried(path: Path) -> tuple[int, dict[str, Any]] | None:
 def read_frames(path: Path) -> tuple[list[Frame], dict[str, Any] | None, str]:
     """Read the frames of a record, and cut the record off where it is damaged.
 
-    An incomplete last line, which was being written when the track ended, is no damage.
+    An incomplete last line, which was being written when the track ended, is accepted.
 
     Returns:
         The frames; the state of the random generator after them, or None if there are
@@ -122,7 +122,7 @@ def _frame_of(line: bytes) -> tuple[Frame, dict[str, Any]]:
     row = json.loads(text, object_hook=_decoded)
     state = row.pop("state")
     posterior = row.pop("posterior")
-    # raises if this is no state of a generator
+    # raises an error if this is not the state of a generator
     np.random.default_rng(0).bit_generator.state = state
     if posterior is not None:
         posterior = Posterior.from_dict(posterior)

@@ -38,7 +38,7 @@ def brief(track: Content) -> list[str]:
     lines = [_quality(measures) if track.trust is None else track.trust.sentence]
     open_poses = sum(weight >= MIN_MODE for weight in track.log.modes or [])
     if setup.frames == 1 and open_poses > 1:
-        lines.append(f"one silhouette leaves {open_poses} poses open")
+        lines.append(f"{open_poses} poses are possible with this one silhouette")
     guessed = ", camera guessed" if setup.camera == "guessed" else ""
     frames = counted(setup.frames, "frame")
     made_by = f"{frames} by {setup.method}{guessed}"
@@ -136,7 +136,7 @@ def held_frames(track: Content) -> str:
         return ""
     show = "frame shows" if count == 1 else "frames show"
     return (
-        f"{count} {show} too little of the person: the pose is held or carried on, "
+        f"{count} {show} too little of the person: the pose is held or continued, "
         "not searched, and may be wrong; these frames are excluded from the IoU"
     )
 

@@ -1,4 +1,4 @@
-"""A document that holds everything it needs: markup, style, scripts and data.
+"""A document that contains everything it needs: markup, style, scripts and data.
 
 It makes no network request.
 """

@@ -23,7 +23,7 @@ from posefit.statistics.paired import PairedTest, paired_tests
 from posefit.statistics.pairing import Shared, most_shared
 
 # A method that lost some tracks, but fewer than these, has no interval. So few losses
-# say little about their frequency: an interval would hold the truth in 86 to 92 % of
+# say little about their frequency: an interval would contain the truth in 86 to 92 % of
 # studies instead of 95 %.
 MIN_LOST = 3
 

@@ -26,7 +26,7 @@ class Standing:
         method: The method's index in the runs.
         name: Its name.
         settings: Its settings as a text.
-        runs: The number of runs that its figures are of.
+        runs: The number of runs from which its figures are computed.
         failed: The number of its quarantined cells.
         warned: The number of its runs with a warning.
         taking_part: Whether it shares enough runs to be compared.

@@ -1,4 +1,4 @@
-"""Reads the finished rows of a ledger into arrays, which hold a million."""
+"""Reads the finished rows of a ledger into arrays, with room for a million rows."""
 
 from array import array
 from collections.abc import Callable, Mapping, Sequence
@@ -323,7 +323,7 @@ def _named(names: Sequence[str], label_of: Mapping[int, str], rows: _Rows) -> li
     for name in names:
         if name not in known:
             raise InputError(
-                f"--methods must be of {listed(sorted(label_of.values()), 12)}, "
+                f"--methods must name some of {listed(sorted(label_of.values()), 12)}, "
                 f"got {quoted(name)}{suggestion(name, known)}"
             )
     return [m for m in label_of if names_of[m] & set(names)]

@@ -51,7 +51,7 @@ def leader_sentences(standings: Standings) -> list[str]:
         sentences.append(f"It is worse than {effects}.")
     if unclear:
         effects = listed([_effect(contest, *pair) for pair in unclear])
-        sentences.append(f"No difference is shown from {effects}.")
+        sentences.append(f"It does not differ significantly from {effects}.")
         sentences += _needed_blocks(contest, unclear)
     if not others:
         sentences.append("No other method shares its runs.")

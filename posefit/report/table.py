@@ -83,7 +83,7 @@ def board_lines(standings: Standings) -> list[str]:
 def board_rows(standings: Standings) -> list[dict[str, Any]]:
     """Return the rows of the leaderboard's CSV file.
 
-    They have every figure under its name, and all else that the page has of a method.
+    Each has every figure under its name, and all else that the page says of a method.
     """
     # of both kinds of runs the first figure is the score
     score, *others = standings.contest.runs.table_figures

@@ -91,14 +91,14 @@ def _baseline_columns() -> list[Column]:
 
 
 def _interval_columns() -> list[Column]:
-    """Return how often the intervals of each level hold the truth, and their widths."""
+    """Return how often intervals of each level contain the truth, and their widths."""
     columns = []
     for level in charts.LEVEL_NAMES:
         shown = level == TABLE_LEVEL
         coverage = replace(
             _share("coverage"),
             name=f"coverage.{level}",
-            label=f"{level} % interval holds",
+            label=f"within {level} % intervals",
         )
         width = replace(
             MEASURES["interval_mm"],
@@ -152,7 +152,7 @@ SCORE = Score(
     caption="Mean of a method's errors with losses: a lost frame counts at least "
     "as much as the mean training pose. "
     "The line is its 95 % interval; dashed lines are baselines. In simulated studies "
-    "the interval holds the true mean in 94 to 97 %, and in 88 to 91 % where a few "
+    "the interval contains the true mean in 94 to 97 %, and in 88 to 91 % where a few "
     "errors are many times larger than the others.",
     leaderboard="Each figure is the mean of a method's runs. In the error with losses "
     "a lost frame counts at least as much as the mean training pose. First come the "

@@ -107,7 +107,7 @@ def write_report(
 def _check_paths(ledgers: Sequence[str | Path], outputs: _Outputs) -> None:
     """Raise an error if an output cannot be written where it is to be.
 
-    What the ledger holds does not matter here, so this comes before it is read.
+    What the ledger contains does not matter here, so this comes before it is read.
     """
     out = outputs.out
     if out is not None and Path(out).suffix.lower() not in (".html", ".htm"):
@@ -139,7 +139,9 @@ def _check_runs(runs: Runs, standings: Standings | None, outputs: _Outputs) -> N
     compared = (("--figures", outputs.figures), ("--latex", outputs.latex))
     for option, path in compared:
         if path is not None and standings is None:
-            raise InputError(f"{option} must be of runs with errors, got none")
+            raise InputError(
+                f"{option} needs runs whose error is known, got a sweep without any"
+            )
 
 
 def _lines(data: Mapping[str, Any], standings: Standings | None) -> list[str]:

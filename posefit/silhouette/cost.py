@@ -59,7 +59,8 @@ def areas(
 
     R is the silhouette without the body, B the body without the silhouette, Y their
     overlap; unknown pixels are in none of them. A bone is not drawn if one of its ends
-    is nearer than 5 cm or behind the camera. The silhouette's device counts.
+    is nearer than 5 cm or behind the camera. Pixels are counted on the silhouette's
+    device.
 
     Args:
         body: the body.

@@ -69,7 +69,7 @@ def uncounted() -> Iterator[None]:
 def count_poses(poses: float, silhouette: Silhouette | None = None) -> None:
     """Add poses to the current count.
 
-    In a smaller image a pose counts by its share of the pixels.
+    A pose in a smaller image counts as a fraction: the image's share of the pixels.
     """
     count = _current.get()
     if count is None:

@@ -92,7 +92,7 @@ class Segmenter(Protocol):
     """
 
     def segment(self, image: Image) -> tuple[Mask, Mask]:
-        """Find the person in an image.
+        """Return the mask of the person in an image, and that of shadow.
 
         Args:
             image: (height, width, 3) uint8.
@@ -154,7 +154,7 @@ def mean_background(images: Iterable[Image]) -> Still:
         total = total + values
         squares = squares + values**2
     if not count:
-        raise InputError("background must hold at least one frame, got none")
+        raise InputError("background must contain at least one frame, got none")
     middle = total / count
     variance = np.maximum(squares / count - middle**2, 0.0).max(axis=-1)
     return Still(middle.astype(np.float32), np.sqrt(variance).astype(np.float32))
@@ -167,7 +167,7 @@ def median_background(images: Iterable[Image]) -> Still:
     """
     stack = images if isinstance(images, np.ndarray) else np.stack(list(images))
     if not len(stack):
-        raise InputError("background must hold at least one frame, got none")
+        raise InputError("background must contain at least one frame, got none")
     middle = np.median(stack, axis=0).astype(np.float32)
     away = np.median(np.abs(stack.astype(np.float32) - middle), axis=0).max(axis=-1)
     return Still(middle, (1.4826 * away).astype(np.float32))
@@ -191,7 +191,7 @@ class Mixture:
             self._model.apply(image)
             count += 1
         if not count:
-            raise InputError("background must hold at least one frame, got none")
+            raise InputError("background must contain at least one frame, got none")
 
     @property
     def background(self) -> Image:

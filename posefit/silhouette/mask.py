@@ -19,8 +19,8 @@ from posefit.silhouette.spans import STRIP_PIXELS
 Mask = NDArray[np.bool_]  # (height, width)
 Areas = NDArray[np.int64]  # (..., 3): R, B, Y
 
-# share of the largest piece's pixels: the person's extent leaves out smaller pieces.
-# The value is from no paper.
+# Share of the largest piece's pixels: the person's extent leaves out smaller pieces.
+# The value is ours.
 MIN_PIECE_PIXELS = 0.06
 
 
@@ -89,6 +89,17 @@ def without_small_pieces(mask: Mask) -> Mask:
 class Silhouette:
     """The person's pixels in one camera's image, and which pixels are known.
 
+    `Silhouette.of` makes one from a mask.
+
+    Attributes:
+        mask: The person's pixels (height, width). Unknown pixels are False.
+        valid: The known pixels (height, width).
+        scale: The silhouette has every `scale`th pixel of every `scale`th row of the
+            full-size one.
+        device: The device that draws poses and counts their pixels; None for the CPU.
+        full_extent: The extent at full size, in pixels of this silhouette; () if this
+            is the full size.
+
     Example:
         >>> import numpy as np
         >>> from posefit import Silhouette
@@ -97,13 +108,10 @@ class Silhouette:
         ((8, 8), True)
     """
 
-    mask: Mask = field(repr=False)  # (height, width); unknown pixels are False
+    mask: Mask = field(repr=False)  # (height, width)
     valid: Mask = field(repr=False)  # (height, width)
-    # it has every `scale`th pixel of every `scale`th row of the full-size silhouette
     scale: int = 1
-    # the device that draws and counts poses; None for the CPU
     device: "Device | None" = None
-    # the extent at full size, in pixels of this silhouette; () if this is the full size
     full_extent: tuple[float, ...] = field(default=(), repr=False)
 
     @classmethod
@@ -118,11 +126,11 @@ class Silhouette:
                 None if all pixels are known.
 
         Returns:
-            The silhouette. Its arrays are read-only: a method that wrote into them
-            would falsify its own audit.
+            The silhouette. Its arrays are read-only, so that a method cannot change
+            the data by which it is judged.
 
         Raises:
-            InputError: if the mask has another number of axes, or the shapes differ.
+            InputError: The mask is not (height, width), or the shapes differ.
 
         """
         values = np.asarray(mask)
@@ -186,7 +194,7 @@ class Silhouette:
 
 
 class Device(Protocol):
-    """Draws poses and counts their areas elsewhere than on the CPU.
+    """Draws poses and counts their areas on other hardware than the CPU.
 
     Example:
         >>> from dataclasses import replace
@@ -211,7 +219,7 @@ class Device(Protocol):
         poses: Array,
         translations: Array,
     ) -> Areas:
-        """Count the areas of poses.
+        """Return the areas of poses.
 
         Args:
             body: the body.

@@ -21,7 +21,7 @@ is only one pose, its cones are next to each other instead, at place `bone`. `st
 the number of places from one bone to the next: LANES or 1.
 
 A bit image is cut into strips of 32 columns. It is (strips, words) uint64; one word
-holds the bits of two rows. As uint32 it is (strips, rows): bit i of image[s, y] is the
+has the bits of two rows. As uint32 it is (strips, rows): bit i of image[s, y] is the
 pixel in column 32 s + i of row y. The number of strips is even, the number of rows a
 multiple of eight:
 

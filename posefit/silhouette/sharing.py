@@ -49,7 +49,7 @@ def parts_of(n: int, threads: int) -> tuple[slice, ...]:
 
 @lru_cache
 def shares_of(n: int, threads: int) -> tuple[slice, ...]:
-    """Return slices of n rows, each of which takes long: one a thread."""
+    """Return slices of n rows, one for each thread, if each row takes long."""
     return _equal_slices(n, max(min(threads, n), 1))
 
 
@@ -88,7 +88,7 @@ def work_through(
                 taken = take(part)
             work(part, *taken)
 
-    # in a copy of this thread's context, which holds the count of drawn poses
+    # in a copy of this thread's context, which contains the count of drawn poses
     others = []
     for _ in range(min(threads, len(parts)) - 1):
         others.append(_pool(threads).submit(copy_context().run, take_turns))

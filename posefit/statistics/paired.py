@@ -85,10 +85,13 @@ def paired_tests(errors: ArrayLike) -> list[PairedTest]:
     Raises:
         ValueError: Errors are not finite or have another shape.
 
-    >>> (pair,) = paired_tests([[[1.0], [2.0], [3.0]], [[2.0], [3.5], [3.5]]])
-    >>> pair.difference, round(pair.p_value, 2)
-    (-1.0, 0.25)
-
+    Example:
+        >>> from posefit import paired_tests
+        >>> first = [[1.0], [2.0], [3.0]]  # 3 instances, one seed
+        >>> second = [[2.0], [3.5], [3.5]]
+        >>> (pair,) = paired_tests([first, second])
+        >>> pair.difference, round(pair.p_value, 2)
+        (-1.0, 0.25)
     """
     array = finite("errors", errors, _SHAPE, (2, 1, 1))
     runs = array.reshape(len(array), -1)  # (methods, blocks)
@@ -165,7 +168,7 @@ def fewest_blocks(comparisons: int) -> int:
 
 
 def holm(p_values: ArrayLike) -> Array:
-    """Return p-values (m,) adjusted so that one level serves all m. Holm, 1979."""
+    """Return p-values (m,) adjusted for m tests at one level. Holm, 1979."""
     return np.minimum(1.0, _accumulated(np.asarray(p_values, dtype=np.float64)))
 
 

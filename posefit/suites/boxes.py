@@ -90,7 +90,7 @@ def learned_without(subject: str) -> Learned:
 class ComponentBox(Components):
     """Latents along principal components.
 
-    Feasible latents are in an ellipsoid that holds 98 % of the learned poses.
+    Feasible latents are in an ellipsoid that contains 98 % of the learned poses.
 
     Args:
         learned: The statistics of the poses.

@@ -3,7 +3,7 @@
 Each is a `posefit.Problem` with a `SuiteCost` as its cost function. Its attributes have
 the same names as in COCO, so loops written for COCO run on it unchanged.
 
-A suite may get more problems. Everything else about it stays the same for ever.
+A suite may get more problems. Everything else about it never changes.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -70,7 +70,7 @@ class SuiteCost:
         optimum: The lowest cost: 0 if the silhouette is of a pose of the box, or None
             if it is unknown.
         truth_cost: The cost of the true pose, which is feasible.
-        looked: Whether `look` was called, so that the method does not search blind.
+        looked: Whether `look` was called, so that the method has used the pictures.
     """
 
     def __init__(
@@ -129,7 +129,7 @@ class SuiteCost:
     def look(self) -> list[list[tuple[Camera, Mask]]]:
         """Return the cameras and masks of each frame.
 
-        A method that calls this does not search blind, and `looked` marks its run. If
+        A method that calls this uses the pictures, and `looked` marks its run. If
         the problem is noisy, the result has the first of its masks.
         """
         self.looked = True
@@ -272,7 +272,7 @@ class Suite:
                 self._addresses.append(address)
         if not self._addresses:
             raise InputError(
-                "a suite must hold at least one problem, "
+                "a suite must contain at least one problem, "
                 f"got none in {list(dimensions)} dimensions"
             )
 
@@ -312,5 +312,5 @@ def _numbers(what: str, numbers: object) -> list[int]:
     # a generator yields them only once
     listed = list(numbers)
     if not listed:
-        raise InputError(f"{what} must hold at least one number, got none")
+        raise InputError(f"{what} must contain at least one number, got none")
     return listed

@@ -202,7 +202,7 @@ class SuiteScore:
         budget: The most evaluations of a run.
         infeasible: The treatment of infeasible proposals, see
             `posefit.suites.problem.SuiteCost`.
-        looked: Whether the method read silhouettes instead of searching blind.
+        looked: Whether the method read silhouettes, and not only costs.
         runs: The number of runs.
         above: The median of the best costs above the true poses'. It is below 0 if
             searches find lower costs.
@@ -258,7 +258,7 @@ def suite_scores(runs: Iterable[SuiteRun]) -> list[SuiteScore]:
             key = run.dimension, function, method_name(run), run.budget, run.infeasible
             groups.setdefault(key, []).append(run)
     if not groups:
-        raise InputError("runs must be at least one, got none")
+        raise InputError("runs must contain at least one run, got none")
     functions_of: dict[int, set[int]] = {}
     for dimension, function, *_ in groups:
         functions_of.setdefault(dimension, set()).add(function)

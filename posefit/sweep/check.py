@@ -142,7 +142,7 @@ def search_method(entry: Mapping[str, Any]) -> dict[str, Any]:
             )
         if setting in chosen:
             raise InputError(
-                f"settings must hold {optimiser}.{setting} once, got it twice"
+                f"settings must name {optimiser}.{setting} once, got it twice"
             )
         chosen[setting] = value
     return {
@@ -183,7 +183,7 @@ def _checked(
     for name in spec:
         if name not in checks:
             raise InputError(
-                f"a cell must hold {', '.join(checks)}, "
+                f"a key of a cell must be one of {', '.join(checks)}, "
                 f"got {quoted(name)}{suggestion(name, checks)}"
             )
     return {name: checks[name](name, value) for name, value in spec.items()}
@@ -247,7 +247,7 @@ def _check_population(
     size = settings.population(offer.factory, chosen, evaluations)
     if size > evaluations:
         raise InputError(
-            f"evaluations must hold one population of {size}, "
+            f"evaluations must be at least {size}, one population, "
             f"got {evaluations} of {offer.name}"
         )
 

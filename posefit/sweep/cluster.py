@@ -38,7 +38,7 @@ class Cluster:
 
     Raises:
         ImportError: The library distributed is not installed.
-        InputError: The scheduler does not answer in time, has no workers, or goes away;
+        InputError: The scheduler does not answer in time, has no workers, or is lost;
             or a worker has another build of posefit.
     """
 
@@ -73,9 +73,7 @@ class Cluster:
         except (OSError, ValueError, TimeoutError) as error:
             self.close()
             cause = " ".join(str(error).split())
-            raise InputError(
-                f"scheduler must answer and have workers, got {scheduler}: {cause}"
-            ) from None
+            raise InputError(f"cannot use the scheduler {scheduler}: {cause}") from None
 
     def _check_versions(self) -> None:
         """Raise InputError if posefit is missing or another build on a remote process.
@@ -96,8 +94,7 @@ class Cluster:
             self._client.run_on_scheduler(eval, _BUILD)
         except ImportError as error:
             raise InputError(
-                f"the scheduler {self._address} must have posefit, "
-                f"got none ({text_of(error)})"
+                f"the scheduler {self._address} cannot import posefit: {text_of(error)}"
             ) from None
 
     def window(self) -> int:
@@ -147,9 +144,7 @@ class Cluster:
             self._client.close(timeout=CLOSE_SECONDS)
 
     def _lost_connection(self) -> InputError:
-        return InputError(
-            f"scheduler {self._address} must stay connected, got a lost connection"
-        )
+        return InputError(f"lost the connection to the scheduler {self._address}")
 
     def _outcome(self, future: Any) -> Outcome:
         job = self._running.pop(future)

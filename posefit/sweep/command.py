@@ -59,12 +59,12 @@ def swept(
         for version, count in ledger.versions().items():
             if any(map(other_version, version.split(", "))):
                 rows = counted(count, "row")
-                say(f"{out}: {rows} of another version, {cut(version)}, not counted")
+                say(f"{out}: {rows} of another version do not count: {cut(version)}")
         ledger.plan(cells_of(plan, shard), done_in(others))
         if retry_quarantined:
             count = ledger.release_quarantined()
             cells = "cell is" if count == 1 else "cells are"
-            say(f"{count} {cells} out of quarantine, to be tried again")
+            say(f"{count} quarantined {cells} tried again")
         counts = ledger.counts()
         total = counts.total()
         if counts["done"]:
@@ -145,4 +145,4 @@ def tally_lines(tally: Tally, out: str) -> list[str]:
     if not tally.done:
         return [line]
     page = shlex.quote(f"{out.rstrip(os.sep)}.html")
-    return [line, f"results: posefit report {shlex.quote(out)} --out {page}"]
+    return [line, f"see the results: posefit report {shlex.quote(out)} --out {page}"]

@@ -179,7 +179,7 @@ class Ledger:
         having = [file.path for file in self._files if file.counts(key)]
         path, *_ = having or [self._files[0].path]
         reason = cut(text_of(error))
-        # a key of somebody else's ledger could hold a command of the shell
+        # a key of somebody else's ledger could contain a command of the shell
         if not KEY.fullmatch(key):
             return InputError(
                 f"{path}: the row and the key of cell {name} must be written by "
@@ -233,7 +233,7 @@ class _File:
                 yield values
 
     def counts(self, key: str) -> bool:
-        """Return whether the cell with this key counts."""
+        """Return whether the cell with this key is among those that count."""
         query = "SELECT rowid, status FROM cells WHERE key = ?"
         for rowid, status in self.query(query, key):
             if _is_in(rowid, self.counted.get(status, [])):
@@ -242,7 +242,7 @@ class _File:
 
 
 def _is_in(rowid: int, rising: Sequence[int]) -> bool:
-    """Return whether a rowid is among others, which rise."""
+    """Return whether a rowid is among others, in ascending order."""
     place = bisect_left(rising, rowid)
     return place < len(rising) and rising[place] == rowid
 

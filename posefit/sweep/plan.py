@@ -56,7 +56,7 @@ DEFAULT = "default"  # the name of the plan that comes with posefit
 INPUT = "-"  # the name of a plan that is read from standard input
 MAX_CELLS = 1_000_000  # of a product
 MAX_BYTES = 1_000_000  # of a plan's text
-# what a grid holds, for messages
+# what a grid contains, for messages
 GRID = 'settings and their values such as "sapso.inertia" = [0.7, 0.9]'
 
 Entry = Mapping[str, Any]
@@ -84,7 +84,7 @@ class Plan:
             keys.add(key)
         self._count = len(keys)
         if not keys:
-            raise InputError("a plan must hold at least one cell, got none")
+            raise InputError("a plan must contain at least one cell, got none")
 
     @classmethod
     def read(cls, path: str | Path) -> Self:
@@ -184,8 +184,8 @@ def _tracks(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
         for name in shared:
             if name not in used:
                 raise InputError(
-                    "defaults.settings must be of the plan's methods, "
-                    f"got {quoted(name)}, which none uses"
+                    "defaults.settings must be settings of the plan's methods, "
+                    f"got {quoted(name)}, which none of them uses"
                 )
 
     return cells
@@ -230,7 +230,7 @@ def _with_methods(crossed: Mapping[str, Any]) -> dict[str, Any]:
     """
     if "methods" in crossed or not all(part in crossed for part in PARTS):
         raise InputError(
-            "product must hold methods, or both optimisers and priors, "
+            "product must contain methods, or both optimisers and priors, "
             f"got {', '.join(crossed)}"
         )
     parts = []
@@ -339,7 +339,7 @@ def _listed(name: str, field: str, values: Any, first: int = 0) -> Sequence[Any]
         raise InputError(f"{name} must be a list, got {quoted(values)}")
     if not values:
         raise InputError(
-            f"{name} must hold at least one, got none: an empty product has no cells"
+            f"{name} must contain at least one, got none: an empty product has no cells"
         )
     return values
 
@@ -374,7 +374,7 @@ def _gridded(
             # an entry may name its settings with or without the method's name
             if {name, name.rpartition(".")[2]} & entry_settings.keys():
                 raise InputError(
-                    "grid must hold settings that no entry of methods sets itself, "
+                    "grid must contain settings that no entry of methods sets itself, "
                     f"got {name}, which one sets"
                 )
         if not applicable:
@@ -386,7 +386,7 @@ def _gridded(
     for name in lists:
         if name not in used:
             raise InputError(
-                f"grid must hold settings of {', '.join(sorted(known))}, the plan's "
+                f"grid must contain settings of {', '.join(sorted(known))}, the plan's "
                 f"methods, got {quoted(name)}"
             )
     return entries
@@ -396,10 +396,10 @@ def _grid_lists(grid: Any) -> dict[str, Any]:
     """Return the values of each setting of a grid by its name NAME.SETTING."""
     lists = flattened("grid", grid) if isinstance(grid, Mapping) else {}
     if not isinstance(grid, Mapping) or (grid and not lists):
-        raise InputError(f"grid must hold {GRID}, got {quoted(grid)}")
+        raise InputError(f"grid must contain {GRID}, got {quoted(grid)}")
     for name, values in lists.items():
         if "." not in name or not isinstance(values, list | tuple) or not values:
-            raise InputError(f"grid must hold {GRID}, got {name} = {quoted(values)}")
+            raise InputError(f"grid must contain {GRID}, got {name} = {quoted(values)}")
     return lists
 
 
@@ -410,7 +410,7 @@ def _check_names(
     for name in table:
         if name not in known:
             raise InputError(
-                f"{what} must hold {', '.join(known)}, "
+                f"a key of {what} must be one of {', '.join(known)}, "
                 f"got {quoted(name)}{suggestion(name, known)}"
             )
 
@@ -430,7 +430,7 @@ def _check_fields(lists: Mapping[str, Sequence[Any]]) -> None:
 def _check_count(lists: Mapping[str, Sequence[Any]]) -> None:
     if (count := prod(map(len, lists.values()))) > MAX_CELLS:
         raise InputError(
-            f"a product must hold at most {MAX_CELLS:,} cells, got {count:,}"
+            f"a product must have at most {MAX_CELLS:,} cells, got {count:,}"
         )
 
 

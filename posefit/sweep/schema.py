@@ -12,9 +12,9 @@ WAL = "-wal"  # suffix of the log that SQLite keeps while a file is written
 MIN_FILE_BYTES = 512  # SQLite's smallest page, and so its smallest file
 COLUMNS = {"key", "kind", "spec", "status", "faults", "losses", "row"}
 # The columns of the view: the column and path of each value, and its type. Expressions
-# in a view have no declared type, and a program that asks for it, such as DuckDB, would
-# take numbers for bytes: 10 would be less than 9. So the view begins with an empty
-# table, whose types SQLite uses for the view.
+# in a view have no declared type, and a program that reads the type, such as DuckDB,
+# would take numbers for bytes: 10 would be less than 9. So the view begins with an
+# empty table, whose types SQLite uses for the view.
 VIEWED = {
     "method": ("spec", "$.method", "TEXT"),
     "name": ("spec", "$.name", "TEXT"),

@@ -137,7 +137,7 @@ def write_csv(rows: Iterable[Mapping[str, Any]], path: str | Path) -> None:
     """
     table = list(rows)
     if not table:
-        raise InputError("rows must be at least one, got none")
+        raise InputError("rows must contain at least one row, got none")
     columns: dict[str, None] = {}  # an ordered set
     for row in table:
         columns.update(dict.fromkeys(row))

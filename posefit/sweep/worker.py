@@ -1,6 +1,6 @@
 """A process of this machine that runs jobs, one after the other: the driver's side.
 
-`posefit.sweep.serve` is the process' own side.
+`posefit.sweep.serve` is the code that this process runs.
 
 A spawned process would import the script that started it again. So `__main__` names no
 file while a process is started.

@@ -1,4 +1,4 @@
-"""Writes a ledger: plans cells, and notes what became of each."""
+"""Writes a ledger: plans cells, and records the outcome of each."""
 
 import json
 import os
@@ -23,7 +23,7 @@ from posefit.sweep.schema import FORMAT, MIGRATIONS, SUFFIX, VERSIONS, WAL, form
 ATTEMPTS = 3
 LOSSES = 50
 BUSY_SECONDS = 60.0  # the longest wait for a program that locks the file in a sweep
-PAGE_BYTES = 8192  # of a new file; a page then holds about three rows
+PAGE_BYTES = 8192  # of a new file; a page then contains about three rows
 NAMES = ("key", "spec", "status")  # the parts of a row that are not figures
 
 
@@ -69,7 +69,7 @@ class Writer:
             if whole != "ok":
                 raise sqlite3.DatabaseError(whole)
         # This must come before the first table. A row takes more than half of a page of
-        # SQLite's usual size, so such a page would hold only one row.
+        # SQLite's usual size, so such a page would contain only one row.
         self._db.execute(f"PRAGMA page_size = {PAGE_BYTES}")
         self._db.executescript("PRAGMA journal_mode = WAL")
         for later in range(form + 1, FORMAT + 1):

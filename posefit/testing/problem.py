@@ -1,4 +1,4 @@
-"""A small real problem for the kit: one frame of the built-in walk."""
+"""A small real problem for the checks: one frame of the built-in walk."""
 
 from functools import lru_cache
 
@@ -30,7 +30,7 @@ def walking_angles() -> Array:
 def principal(angles: Array) -> Components:
     """Return the principal components of joint angles (T, 63), and their range.
 
-    With these the kit needs no plugin's prior.
+    With these, the checks need no plugin's prior.
     """
     mean = angles.mean(axis=0)
     _, _, directions = np.linalg.svd(angles - mean, full_matrices=False)

@@ -115,7 +115,7 @@ def _messages(task: dict[str, Any]) -> tuple[list[dict[str, Any]], str]:
 
 
 def _check() -> None:
-    """Run the checks that standard input asks for, and end this process."""
+    """Run the checks that standard input describes, and end this process."""
     faulthandler.enable()
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
     # the plugin's prints must not mix with the messages
@@ -166,9 +166,9 @@ def _checks(
             labels.append(f"{plugin.name} ({plugin.distribution} {plugin.version})")
         theirs = ", ".join(labels)
         raise InputError(
-            f"{kind} {name!r} must be of one plugin, "
-            f"got that of {offer.distribution}, which is used, "
-            f"and that of {theirs}, which is left out: give it another name"
+            f"{kind} {name!r} must be registered by one plugin, "
+            f"got {offer.distribution}, which is used, "
+            f"and {theirs}, which is left out: give it another name"
         )
     settings = parse_texts(offer.name, offer.factory, texts)
     if kind == "prior" and settings:

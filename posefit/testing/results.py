@@ -154,7 +154,7 @@ def _plugin_traceback(error: BaseException) -> str:
     """Return an error's traceback without the leading frames of posefit."""
     rest = error.__traceback__
     while rest is not None:
-        # the author wants to see the plugin's frames, not the kit's
+        # show the author the frames of the plugin, not those of the checks
         if POSEFIT not in Path(rest.tb_frame.f_code.co_filename).parents:
             return "".join(traceback.format_exception(type(error), error, rest)).strip()
         rest = rest.tb_next

@@ -23,7 +23,7 @@ def anywhere(proposals: Array) -> NDArray[np.bool_]:
 def ball(proposals: Array) -> NDArray[np.bool_]:
     """Return which proposals (n, d) lie in a ball.
 
-    It holds about a third of the box, the target included.
+    It contains about a third of the box, the target included.
     """
     return np.asarray((proposals**2).mean(axis=1) < 0.3)
 

@@ -48,7 +48,7 @@ def scene() -> tuple[Task, Motion, Sequence[Observation]]:
 
 
 class Tracked(NamedTuple):
-    """The frames of a tracker, and how it came to them.
+    """The frames of a tracker, and how it computed them.
 
     Attributes:
         tracker: the tracker, after its first track.

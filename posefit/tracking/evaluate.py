@@ -91,7 +91,7 @@ def evaluate(
         warnings=warnings,
         guesses=[*scene.guesses],
     )
-    gait = Gait(why="one frame is no walk")
+    gait = Gait(why="one frame is not a walk")
     if len(frames) > 1:
         gait = gait_of(motion, unseen(table))
     setup = _setup(scene, method, task, options)

@@ -4,6 +4,7 @@ They complete the options, make a scene from the source, and track it.
 """
 
 import inspect
+import textwrap
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
@@ -40,8 +41,9 @@ from posefit.tracking.pipeline import track_scene
 from posefit.tracking.result import Fit, Track
 from posefit.version import __version__
 
-# the arguments of a track that are no fields of TrackOptions
+# the arguments of a track that are not fields of TrackOptions
 _ARGUMENTS = ("out", "force", "resume", "write", "progress")
+DOCSTRING_WIDTH = 84  # columns of a described option, 88 in an indented docstring
 # options that may name files, which are compared by content
 _FILES = ("source", "train", "asf", "camera", "extraction")
 
@@ -73,7 +75,7 @@ def track(
         write: The files to write, such as "bvh,trc" or ["bvh", "trc"]; by default all.
         progress: Receives messages and progress bars; by default they go to the
             terminal or the notebook.
-        options: The options below.
+        options: The options that follow.
 
     Returns:
         The track, with its errors if the truth is known.
@@ -142,10 +144,13 @@ def fit(
         source: As for `track`, or one mask (H, W).
         frame: The frame's number, as filmed or, for a motion, after resampling; by
             default the first.
-        options: As for `track`, without `frames`.
+        options: `out` and the other arguments of `track`, and the options that follow.
 
     Returns:
         The pose and its track of one frame.
+
+    Raises:
+        InputError: There is a mistake in the arguments or files.
 
     Example:
         >>> import posefit
@@ -264,7 +269,7 @@ def _identity(
 
 
 def _documented(function: Callable[..., Any]) -> None:
-    """Add the options of a track to a function's signature and docstring."""
+    """Add the options of a track to a function's signature and its docstring's Args."""
     parameters = []
     for parameter in inspect.signature(function).parameters.values():
         if parameter.kind is not parameter.VAR_KEYWORD:
@@ -280,11 +285,20 @@ def _documented(function: Callable[..., Any]) -> None:
             annotation=option.type,
         )
         parameters.append(parameter)
-        lines.append(f"    {option.name}: {declared(option).help}\n")
+        described = f"{option.name}: {declared(option).help}"
+        lines += textwrap.wrap(
+            described,
+            DOCSTRING_WIDTH,
+            initial_indent="    ",
+            subsequent_indent="        ",
+            break_on_hyphens=False,
+        )
     signature = inspect.Signature(parameters)
     function.__signature__ = signature  # type: ignore[attr-defined]
-    described = (function.__doc__ or "").rstrip()
-    function.__doc__ = f"{described}\n\n    Options:\n{''.join(lines)}"
+    arguments, heading, rest = inspect.cleandoc(function.__doc__ or "").partition(
+        "\n\nReturns:\n"
+    )
+    function.__doc__ = "\n".join([arguments, *lines]) + heading + rest
 
 
 _documented(track)

@@ -1,4 +1,4 @@
-"""Tracks a person in frames as they come: `posefit track --live`."""
+"""Tracks a person in frames as they arrive: `posefit track --live`."""
 
 import json
 import os
@@ -214,7 +214,7 @@ def write_live(
         pass
     except BaseException:
         if folder is not None and not latencies:
-            # nothing stays after a failed start, so that the same command can be
+            # a failed start leaves nothing behind, so that the same command can be
             # repeated
             (folder / FRAMES_FILE).unlink(missing_ok=True)
             folder.rmdir()

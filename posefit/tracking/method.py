@@ -128,7 +128,7 @@ class Method:
         audit: The violations of rules that its trackers made so far.
         follow: Yields a frame for each observation of a task. It is
             `posefit.fitting.driving.drive` for this method's tracker and audit.
-        start: Guesses first poses, or None for blind searches.
+        start: Guesses first poses, or None for searches without a start.
 
     """
 

@@ -87,21 +87,21 @@ class TrackOptions(SourceOptions):
         (),
         "Training motions: a motion, a folder, library, or library:16; repeatable. "
         "Default: library for exemplars; for other methods the other styles of a "
-        "built-in motion, or walks.",
+        "built-in motion, or the built-in walks.",
         _sources,
         "SOURCE",
         repeated=True,
     )
     evaluations: int | None = whole_option(
         None,
-        "Budget per frame. Default: 9760 for exemplars, else N (C + 1) = 40 x 61 = "
+        "Number of poses to compare with each frame. Default: 9760 for exemplars, else "
         "2440.",
         1,
         "POSES",
     )
     translation: "Translation | None" = option(
         None,
-        "Position of the root: known (the truth), searched, or aligned to the mask. "
+        "Position of the root: known (the true one), searched, or aligned to the mask. "
         "Default: known for motions, aligned for footage.",
         choice("known", "searched", "aligned"),
         "HOW",
@@ -134,7 +134,7 @@ class TrackOptions(SourceOptions):
     )
     smooth: bool | None = option(
         None,
-        "Smooth the root, and keep feet from sliding. Default for footage.",
+        "Smooth the root, and keep feet from sliding. Default: only for footage.",
         _flag,
         parse=bool,
         identifies=False,

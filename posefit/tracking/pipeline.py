@@ -82,7 +82,7 @@ def with_notes(scene: Scene, training: Sequence[Motion]) -> Scene:
                 notes.append(note)
     if len(notes) > MAX_NOTES:
         more = len(notes) - MAX_NOTES
-        notes[MAX_NOTES:] = [f"and {more} more of files to learn from"]
+        notes[MAX_NOTES:] = [f"and {more} more about training files"]
     return replace(scene, warnings=[*scene.warnings, *notes])
 
 
@@ -180,7 +180,7 @@ def track_scene(
         scene = with_turns(result.scene, given.cameras)
         for guess in _added(scene.guesses, given.guesses):
             progress.log(guess)
-        # evaluating a track is no effort of the method
+        # evaluating a track is not part of the method's effort
         with progress.phase("evaluate"), uncounted():
             taken = clocks() - started.start + scene.reading_seconds
             seconds, cpu_seconds = taken.tolist()
@@ -322,7 +322,7 @@ def track_hypotheses(
             hypothesis = _resumed(hypothesis, frames, state)
             frames = list(hypothesis.frames)
             of_several = f" of {which}, {hypothesis.guess}" if total > 1 else ""
-            progress.log(f"going on from frame {done} of {count}{of_several}")
+            progress.log(f"continuing from frame {done} of {count}{of_several}")
             if _starts_over(method, frames):
                 progress.warn(
                     f"{method.name} starts over at frame {done}: the frames from there"
@@ -437,8 +437,8 @@ def _budget(
 def _passes(scene: Scene, method: Method, evaluations: int, smoothed: bool) -> int:
     """Return how often a film is tracked.
 
-    Several passes pay with several cameras: these show which of two poses is right, but
-    only once both are tried.
+    With several cameras, several passes are worthwhile: the cameras show which of two
+    poses is right, but only once both are tried.
     """
     if len(scene.cameras) == 1 or scene.count < SHORTEST or scene.truth is not None:
         return 1

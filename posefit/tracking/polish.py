@@ -138,7 +138,7 @@ def beyond_prior(prior: Latents, skeleton: Skeleton, pose: Array) -> str:
     if off <= APART:
         return ""
     return (
-        "the prior does not know this pose: the nearest that it knows is "
+        "the prior cannot represent this pose: the nearest that it can represent is "
         f"{1e3 * off:.0f} mm off, so the search had to leave the prior; "
         "--train adds motions with such poses"
     )

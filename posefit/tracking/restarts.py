@@ -91,7 +91,7 @@ def stream(
 
 
 def independent(rng: np.random.Generator) -> np.random.Generator:
-    """Return a generator seeded by the next draw of another, which stays unchanged."""
+    """Return a generator seeded by the next draw of another, which is not changed."""
     return np.random.default_rng(deepcopy(rng).integers(0, 2**63, 4))
 
 
@@ -449,7 +449,7 @@ def retrack_spins(
 ) -> Tracked:
     """Return a track without spins.
 
-    Only the longest run of frames that face as most frames do stays, between its best
+    Only the longest run of frames that face as most frames do is kept, between its best
     ends; see `facing_consensus`. The person is followed onward from its last frame, and
     backwards from its first frame with reversed training motions. The old track is kept
     if the new one spins as often, or costs half as much again. Frames that are tracked
@@ -463,8 +463,8 @@ def retrack_spins(
         seed: The seed of the random numbers.
 
     Returns:
-        The track. Its `stay` has the first and the last frame that stayed, or None if
-        all did.
+        The track. Its `stay` has the first and the last frame that were kept, or None
+        if all were.
 
     """
     frames = tracked.frames

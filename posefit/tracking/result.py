@@ -174,7 +174,11 @@ class Track:
         return Fit(self, range(len(self))[k])
 
     def show(self) -> Any:
-        """Show the page of the track inline in a notebook, or else in a browser."""
+        """Show the page of the track inline in a notebook, or else in a browser.
+
+        Returns:
+            The page as a notebook displays it, or else the path of its file.
+        """
         page = self.page()
         try:
             shell = importlib.import_module("IPython").get_ipython()

@@ -47,7 +47,7 @@ class Tracked(NamedTuple):
     frames: list[Frame]
     # a row for each of several hypotheses: guess, cost, motion term, whether it is kept
     hypotheses: list[dict[str, Any]]
-    # the first and last frame that stayed when a spin was tracked again, see
+    # the first and last frame that were kept when a spin was tracked again, see
     # `retrack_spins`
     stay: tuple[int, int] | None = None
 
@@ -166,8 +166,8 @@ def trajectory_cost(
     from one thirtieth of a second to the next, over the square of twice the typical
     speed. A joint that turns around on the spot at the typical speed costs a half. The
     term is the mean over joints and frames, and is added to the mean silhouette cost as
-    it is. The change in a frame counts as five typical speeds at most: a jump is a
-    jump, however far.
+    it is. The change in a frame counts as five typical speeds at most, so a longer
+    jump costs no more.
 
     Args:
         frames: The frames of the trajectory.

@@ -104,7 +104,7 @@ def quantiles(
     levels = np.array(LEVELS)[:, None]
     low = np.zeros((len(LEVELS), len(spread)))
     high = np.tile(away.max(axis=0) + FARTHEST * spread, (len(LEVELS), 1))
-    # the distribution of a mixture has no inverse in closed form, so it is bisected
+    # a mixture's distribution has no inverse in closed form: it is found by bisection
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         near = (middle[:, None] - away) / spread  # (levels, K, n)

@@ -66,7 +66,7 @@ class Posterior:
         poses: The poses (K, 66).
         translations: The places of the root (K, 3) in metres.
         weights: The weights (K,). They are divided by their sum.
-        coherent: Whether row k of all frames of a track is one possible track.
+        coherent: Whether the rows k of all frames of a track form one possible track.
         recalibration: Learned corrections of the poses' errors.
         modes: The result of `modes_of`, which is filled in for the frames of a track.
 

@@ -179,7 +179,7 @@ def test_compiling_is_announced_once_in_the_process_that_a_user_started(
         announced[word] = process(
             tmp_path, str(tmp_path / "script.py"), word
         ).stderr.splitlines()
-    message = "compiling the kernels, once on this machine; this takes ten seconds or more ..."
+    message = "compiling kernels for their first use on this machine; this takes ten seconds or more ..."
     assert announced == {"child": [], "quiet": [], "": [message], "again": []}
 
 

@@ -304,10 +304,10 @@ def test_a_mistake_is_reported_in_one_line_and_status_2(tmp_path: Path) -> None:
             "motion must be a file, a folder, a recorded motion that posefit motions lists, or one of walk, ",
         ),
         (["library"], "a recorded motion that posefit motions lists, or one of walk, "),
-        (["lost/"], "lost: expected a file or a folder, got nothing of that name"),
+        (["lost/"], "lost: no such file or folder"),
         (
             ["walk", "--train", "lost/"],
-            "lost: expected a file or a folder, got nothing of that name",
+            "lost: no such file or folder",
         ),
         (
             ["walk", "--roi", "1,2,3,4"],
@@ -321,8 +321,8 @@ def test_a_mistake_is_reported_in_one_line_and_status_2(tmp_path: Path) -> None:
             ["lost.avi", "--size", "320x240"],
             "size applies only to motions, got (320, 240) for a video",
         ),
-        (["lost.amc"], "lost.amc: expected a file, got nothing of that name"),
-        (["walk.txt"], "walk.txt: expected a file"),
+        (["lost.amc"], "lost.amc: no such file"),
+        (["walk.txt"], "walk.txt: no such file"),
         (["walk", "--size", "320"], "expected WIDTHxHEIGHT"),
         (["walk", "--size", "0x9"], "size must be from 1x1"),
         (["walk", "--frames", "3"], "expected A:B"),
@@ -687,7 +687,7 @@ def test_names_from_outside_do_not_steer_the_terminal(
     ):
         assert len(error_of(*words)) < 400
     assert error_of("track", "a\x1b[31m\nb.amc").startswith(
-        r"posefit: a\x1b[31m\nb.amc: expected "
+        r"posefit: a\x1b[31m\nb.amc: no such file"
     )
 
 

@@ -75,7 +75,7 @@ def test_an_environment_that_cannot_be_driven_is_named() -> None:
     ):
         drive(vector, "sapso")
     with pytest.raises(
-        error.Error, match="evaluations must hold one population of 40, got 20"
+        error.Error, match="evaluations must be at least 40, one population, got 20"
     ):
         drive_each(vector, "sapso", evaluations=20)
     for other in (

@@ -330,7 +330,7 @@ def test_the_budget_is_used_in_whole_populations() -> None:
     assert problem.points.tolist() == [[0.0], [1.0], [2.0], [3.0], [4.0]]
     assert len(walker.evaluated) == 5
     with pytest.raises(
-        BudgetError, match="evaluations must hold one population of 7, got 6"
+        BudgetError, match="evaluations must be at least 7, one population, got 6"
     ):
         minimise(Problem(lambda x: x[:, 0], LINE, 6), Walker(7))
     with pytest.raises(ValueError, match="must propose a population, got an empty"):
@@ -359,7 +359,7 @@ def test_nothing_is_evaluated_beyond_the_budget_and_nothing_wrong_is_counted() -
     assert problem.evaluations == 4
     problem.reset()
     assert (problem.evaluations, problem.best_cost) == (0, np.inf)
-    with pytest.raises(ValueError, match="a line must have been evaluated"):
+    with pytest.raises(ValueError, match="a line must have a finite cost"):
         _ = problem.best
 
 

@@ -147,7 +147,7 @@ def test_a_crowd_is_unknown_beside_people_and_else_a_person(
         last = k == len(walk) - 1
         np.testing.assert_array_equal(silhouette.mask, crowd if last else mask)
         np.testing.assert_array_equal(silhouette.valid, mask | ~crowd | last)
-    assert any("marked iscrowd is unknown" in guess for guess in view.guesses)
+    assert any("marked iscrowd are unknown" in guess for guess in view.guesses)
 
 
 def test_annotations_of_no_image_are_said(walk: list[Any], tmp_path: Path) -> None:

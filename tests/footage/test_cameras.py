@@ -195,7 +195,7 @@ def test_a_camera_under_the_floor_is_doubted(tmp_path: Path) -> None:
         path.write_text(programs.opencv(tvec=tvec))
         scene = scene_of([masks], SourceOptions(camera=[path], height=1.7))
         said = [
-            guess for guess in scene.guesses if "is its translation its place" in guess
+            guess for guess in scene.guesses if "below the origin of the world" in guess
         ]
         assert bool(said) == doubted
 
@@ -298,13 +298,13 @@ def test_every_camera_follows_the_person_whom_the_first_one_follows(
 def test_everything_that_is_guessed_is_reported(tmp_path: Path) -> None:
     (source, _), bare = views(tmp_path), tmp_path / "bare.yml"
     assert list(scene_of([source]).guesses) == [
-        "a level camera, 40 degrees across: distances and sizes are as good as that",
+        "a level camera, 40 degrees across: distances and sizes are only as good as this guess",
         "a person of 1.74 m",
     ]
     bare.write_text("K: [[200, 0, 79.5], [0, 200, 59.5], [0, 0, 1]]\n")
     scene = scene_of([source], SourceOptions(camera=[bare], height=1.7))
     assert list(scene.guesses) == [
-        "the camera stands level, which its calibration does not state",
+        "the camera is level, which its calibration does not state",
         "the calibration is for pictures of this size, which it does not state",
     ]
     bare.write_text("K: [[200, 0, 79.5], [0, 200, 259.5], [0, 0, 1]]\n")

@@ -195,7 +195,7 @@ def test_the_command_prints_a_summary(filmed: Film, tmp_path: Path) -> None:
         ),
         (
             ["--background", "nothing.png"],
-            "nothing.png: expected a file, got nothing of that name",
+            "nothing.png: no such file",
         ),
         (
             ["--set", "mixture.colour=3"],
@@ -227,7 +227,7 @@ def test_a_file_that_is_no_video_is_named(tmp_path: Path) -> None:
     (tmp_path / "text.mp4").write_text("no video")
     (tmp_path / "empty.mp4").write_bytes(b"")
     for name, message in (
-        ("missing.mp4", "expected a video file, got nothing of that name"),
+        ("missing.mp4", "missing.mp4: no such file"),
         ("text.mp4", "expected a video that OpenCV can read"),
         ("empty.mp4", "expected a video that OpenCV can read"),
     ):
@@ -317,11 +317,8 @@ def test_a_moment_that_was_not_filmed_shows_the_nearest_frame(tmp_path: Path) ->
     assert frame_numbers(video, 2, 6) == numbers[2:6]
     assert [k for k in range(12) if not video.is_filmed(k)] == [4, 7, 8]
     (warning,) = video.warnings
-    assert "its frames come at uneven times; it is sampled 30" in warning
-    assert (
-        "so that 3 of 12 frames stand for moments without a filmed one, and are held"
-        in warning
-    )
+    assert "its frames come at uneven times, so it is sampled 30" in warning
+    assert "3 of these 12 frames were not filmed" in warning
 
 
 def test_even_times_leave_a_video_as_it_was(tmp_path: Path) -> None:
@@ -370,8 +367,8 @@ def test_a_rate_in_the_head_yields_to_even_time_stamps(
     assert bool(video.guesses) == (video.fps != stated)
     if video.guesses:
         (guess,) = video.guesses
-        assert f"{video.fps:.4g} frames a second by its frames' times" in guess
-        assert f"where its head says {stated}" in guess
+        assert f"{video.fps:.4g} frames a second by the times of its frames" in guess
+        assert f"although its header says {stated}" in guess
         assert video.claimed == 0  # counted by the head's rate
 
 

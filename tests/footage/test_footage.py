@@ -212,7 +212,7 @@ def test_a_resumed_track_continues_at_its_last_frame(tmp_path: Path) -> None:
         progress=Progress(messages.append),
         **settings,
     )
-    assert "going on from frame 11 of 20" in messages
+    assert "continuing from frame 11 of 20" in messages
     out, files = (
         {path.name for path in (tmp_path / name).iterdir()} for name in ("out", "whole")
     )
@@ -257,7 +257,7 @@ def test_a_full_disk_is_reported_in_one_line_and_loses_no_frame(tmp_path: Path) 
     assert not (tmp_path / "out").exists()
     again = run(*words, "--resume")
     assert again.exit_code == 0, again.stderr
-    assert "going on from frame" in again.stderr
+    assert "continuing from frame" in again.stderr
 
 
 def test_two_people_and_a_moving_camera_are_warned_of(tmp_path: Path) -> None:
@@ -395,7 +395,7 @@ def test_a_mistake_with_footage_leaves_one_line(
         ("rle.json", "{}", "expected COCO's lists images, annotations and categories"),
         ("poses.pkl", "x", "masks and motions of .pkl are not read; masks as images"),
         ("noext", "x", "a file name with a suffix such as .mp4"),
-        ("missing.trc", None, "expected a file, got nothing of that name"),
+        ("missing.trc", None, "missing.trc: no such file"),
     ],
 )
 def test_a_file_that_is_no_source_is_named_by_its_type(

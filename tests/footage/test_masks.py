@@ -231,7 +231,7 @@ def test_an_edge_between_two_values_is_no_label(
         (["PICTURES"], "pictures: expected masks, got pictures in many colours"),
         (
             ["EMPTY"],
-            "empty: expected a mask with a person before a background, got an empty one first, and no other",
+            "empty: expected a mask with a person and a background, got an empty one first, and no other",
         ),
         (["SIZES"], "0001.png: mask must have shape (120, 160), got (60, 80)"),
     ],
@@ -287,7 +287,7 @@ def test_inverted_masks_are_turned_round_with_a_warning(
     (warning,) = check(path, walk)[1]
     assert (
         warning
-        == f"{path}: most of the border is marked, so that the masks seem inverted: they are turned round"
+        == f"{path}: the masks cover most of the picture's border, so they seem to be inverted, and are inverted back"
     )
 
 
@@ -683,7 +683,7 @@ def test_degrees_of_many_values_are_no_labels(walk: list[Any], tmp_path: Path) -
     for full, kind in ((255, np.uint8), (255, np.int32), (1000, np.int32)):
         soft = [(softened(mask) * full).astype(kind) for mask in walk]
         masks = read_masks(stack(tmp_path / "a.npz", soft), ALL)
-        assert "are degrees" in masks.guesses[0]
+        assert "are confidences" in masks.guesses[0]
 
 
 @each("label", [1, 15])

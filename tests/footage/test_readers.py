@@ -333,7 +333,7 @@ def test_logits_are_cut_at_zero_and_degrees_half_way(
         threshold = half or 0.5 * float(degrees.max())
         np.save(tmp_path / "a.npy", degrees)
         (guess,) = check(tmp_path / "a.npy", list(degrees > threshold))
-        assert guess.endswith(f"are degrees: the person is above {threshold:g}")
+        assert guess.endswith(f"are confidences: the person is above {threshold:g}")
 
 
 @each("kind", [np.uint8, np.int32, np.float32])

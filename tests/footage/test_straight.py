@@ -222,7 +222,7 @@ def test_a_known_motion_is_drawn_with_square_pixels(tmp_path: Path) -> None:
         # filled up by a codec
         (
             (640, 470),
-            ["the calibration 'cam0' of 640x470 holds for 640x480, with rows or columns more or less at the end"],
+            ["the calibration 'cam0' of 640x470 is used for 640x480, with more or fewer rows or columns at the end"],
         ),
     ],
 )  # fmt: skip

@@ -38,7 +38,7 @@ def test_mistakes_are_reported_in_one_line() -> None:
         ),
         (
             ["--train", "library:16", "--without-subject", "16"],
-            "the library must keep at least one person",
+            "at least one person of the library must remain",
         ),
     ]:
         assert error_of("track", "walk", *words).startswith(f"posefit: {message}")
@@ -114,7 +114,10 @@ def test_a_folder_with_a_clip_that_cannot_be_read_is_reported_in_one_line(
     path = tmp_path / "a.bvh"
     words = ("track", "walk", "--train", tmp_path, "--out", tmp_path / "out")
     path.mkdir()
-    assert "expected a folder of .amc or .bvh files, got none in it" in error_of(*words)
+    assert (
+        "expected a folder of .amc or .bvh files, got a folder without any"
+        in error_of(*words)
+    )
     path.rmdir()
     write_bvh(path, built_in.motion("walk-a", frames=3, fps=60.0))
     text = path.read_text()
@@ -127,7 +130,7 @@ def test_a_clip_of_one_frame_is_too_short_to_learn_from(tmp_path: Path) -> None:
     write_bvh(tmp_path / "a.bvh", built_in.motion("walk-a", frames=1))
     for method, message in (
         ("exemplars", "a must have at least 2 frames to be followed, got 1"),
-        ("@pca", "angles must hold at least 7 frames, got 1"),
+        ("@pca", "angles must contain at least 7 frames, got 1"),
     ):
         words = ["--train", tmp_path, "--frames", "0:2", "--method", method]
         assert error_of("track", "walk", *words) == f"posefit: {message}"

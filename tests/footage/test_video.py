@@ -42,7 +42,7 @@ def test_pixels_that_are_not_square_are_reported(tmp_path: Path) -> None:
         write_matroska(tmp_path / "a.mkv", images, range(0, 200, 40), wide=93)
     ).warnings
     assert (
-        "a.mkv: its pixels are 1.45 times as wide as high, which is not corrected"
+        "a.mkv: its pixels are 1.45 times as wide as high. This is not corrected"
         in warning
     )
 

@@ -402,5 +402,5 @@ def test_no_two_cameras_are_at_one_place(tmp_path: Path, written: bool) -> None:
     if written:
         (tmp_path / "a.json").write_text(one.to_json())
         one = tmp_path / "a.json"
-    with pytest.raises(InputError, match="one place and one direction for"):
+    with pytest.raises(InputError, match="the same place and direction for"):
         seen(sources, camera=[one, one], fps=FPS)

@@ -215,7 +215,7 @@ def test_walking_in_place_gives_only_times(
     ] == [None] * 4
     line = gait_line(gait.as_dict())
     assert line.endswith(
-        "; no lengths: the person stays in one place: on the spot, on a treadmill, or before a camera that turns with them"
+        "; no lengths: the person stays in one place: on the spot, on a treadmill, or in front of a camera that turns with them"
     )
 
 

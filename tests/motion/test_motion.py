@@ -38,7 +38,7 @@ def clip(frames: int, fps: float = 120.0) -> Motion:
             np.zeros((0, 66)),
             np.zeros((0, 3)),
             30.0,
-            "poses must hold at least 1 frame, got 0",
+            "poses must contain at least 1 frame, got 0",
         ),
         (
             np.full((1, 66), np.nan),

@@ -141,7 +141,9 @@ def test_mistakes_in_settings_are_named() -> None:
     ):
         with pytest.raises(ValueError, match=message):
             kind(**settings)
-    with pytest.raises(ValueError, match="angles must hold at least 7 frames, got 3"):
+    with pytest.raises(
+        ValueError, match="angles must contain at least 7 frames, got 3"
+    ):
         PCA().fit(np.zeros((3, 63)))
 
 

@@ -75,7 +75,7 @@ def test_a_place_that_is_not_known_is_found_in_the_masks(method: str) -> None:
 def test_without_training_there_is_reported_in_one_line() -> None:
     task = replace(scene()[0], training=())
     for name in TRACKERS:
-        with pytest.raises(ValueError, match="training must hold a motion"):
+        with pytest.raises(ValueError, match="training must contain a motion"):
             list(
                 registry()
                 .offer("tracker", name)
@@ -83,7 +83,7 @@ def test_without_training_there_is_reported_in_one_line() -> None:
                 .track(scene()[2], np.random.default_rng(0))
             )
     for name in ("isomap", "gplvm"):
-        with pytest.raises(ValueError, match="angles must hold at least"):
+        with pytest.raises(ValueError, match="angles must contain at least"):
             registry().offer("prior", name).factory().fit(np.zeros((3, 63)))
 
 

@@ -301,7 +301,7 @@ class Hungry:
 def test_a_population_that_no_budget_holds_is_refused_before_it_is_drawn(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    message = f"evaluations must hold one population of {HUGE}, got 100"
+    message = f"evaluations must be at least {HUGE}, one population, got 100"
     sized = [
         offer
         for offer in registry().offers["optimiser"].values()

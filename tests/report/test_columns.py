@@ -36,7 +36,7 @@ def test_figures_have_the_units_of_the_csv_and_pages_multiply_them(row):
     shown = COLUMNS["cpu_seconds_per_frame"].as_dict()
     assert (shown["title"], shown["factor"]) == ("CPU time ms a frame", 1e3)
     shown = COLUMNS["coverage.80"].as_dict()
-    assert (shown["title"], shown["factor"]) == ("80 % interval holds %", 100.0)
+    assert (shown["title"], shown["factor"]) == ("within 80 % intervals %", 100.0)
 
 
 def test_a_row_has_how_often_the_likeliest_mode_was_right(row):

@@ -40,7 +40,7 @@ def test_the_leader_its_lead_and_how_certain_it_is(tmp_path: Path) -> None:
         "a lost frames in none of 12 tracks and has an error with losses of 1.26° "
         f"(95 % interval {first['low']:.2f}° to {first['high']:.2f}°) {WHERE}; "
         f"it leads b by 1.02° ({low:.2f}° to {high:.2f}°, p = 0.0015).",
-        "No difference is shown from c (+0.00°, +0.00° to +0.00°, p = 1).",
+        "It does not differ significantly from c (+0.00°, +0.00° to +0.00°, p = 1).",
         "Not even 1,000 seeds of each instance would show differences as small as these.",
         "The best baseline, the mean training pose, has 4.00°.",
     ]
@@ -69,7 +69,7 @@ def test_without_a_difference_no_method_leads_and_too_few_runs_are_named(
     assert text[:3] == [
         "No method leads; a, which comes first, lost frames in none of 5 tracks and has an error with losses of "
         "1.00° on 5 instances of walk with one seed.",
-        "No difference is shown from b (+3.00°, p = 0.062).",
+        "It does not differ significantly from b (+3.00°, p = 0.062).",
         "5 paired runs cannot show a difference between 2 methods: that takes at least 6.",
     ]
 
@@ -88,7 +88,7 @@ def test_a_better_method_with_more_losses_is_not_called_worse(
     text = sentences(contest_of_results(tmp_path, made))
     assert text[0].startswith("No method leads; a, which comes first, lost frames in")
     # the lost track counts as the mean training pose, 4: 2.95 behind, the others 0.1 ahead
-    assert text[1].startswith("No difference is shown from b (+0.15°, ")
+    assert text[1].startswith("It does not differ significantly from b (+0.15°, ")
     assert text[1].endswith(", lost in 1 of 12).")
 
 
@@ -99,7 +99,10 @@ def test_one_method_alone_one_run_alone_and_a_leader_behind_the_baselines(
     many = {"a": 1.0, "b": 2.0, "c": 3.0, "d": 4.0, "e": 5.0}
     cases = [
         (full(many, instances=8), "p < 0.001), and c, d and e by more (p < 0.001)."),
-        (full({"a": 1.0, "b": 1.0}, 4), "is shown from b (equal in all runs)."),
+        (
+            full({"a": 1.0, "b": 1.0}, 4),
+            "does not differ significantly from b (equal in all runs).",
+        ),
         (full({"a": 1.0}), "a lost frames in none of 4 tracks and has an error with "),
         (full({"a": 1.0}), "No other method shares its runs."),
         (full(two, instances=1, seeds=1), "One shared run shows no difference between"),

@@ -431,6 +431,8 @@ def test_long_arrays_are_embedded_in_pieces(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_csv_without_rows_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="rows must be at least one, got none"):
+    with pytest.raises(
+        ValueError, match="rows must contain at least one row, got none"
+    ):
         write_csv([], tmp_path / "rows.csv")
     assert list(tmp_path.iterdir()) == []

@@ -345,9 +345,9 @@ def test_a_single_model_is_a_kalman_filter_and_a_model_that_nothing_leads_to_sta
     [
         (
             np.full((2, 2), 0.4),
-            "transition must hold probabilities whose rows sum to 1",
+            "transition must contain probabilities whose rows sum to 1",
         ),
-        (np.array([[1.5, -0.5], [0.0, 1.0]]), "transition must hold probabilities"),
+        (np.array([[1.5, -0.5], [0.0, 1.0]]), "transition must contain probabilities"),
     ],
 )
 def test_a_transition_that_is_none_is_named(transition: Array, message: str) -> None:

@@ -286,7 +286,7 @@ def test_the_ledger_is_a_table(results: Path) -> None:
         (["run", "sapso", "--function", 1, "--dimension", 66], r"at least one problem, got none in \[66\] dimensions"),
         (["run", "sapso", "--instances", "5:2"], "--instances must be A:B with 0 <= A < B <= 20000, got 5:2"),
         (["run", "sapso", "--budget", 0], "budget must be at least 1, got 0"),
-        (["run", "sapso", "--budget", 4], "evaluations must hold one population of 40, got 36"),
+        (["run", "sapso", "--budget", 4], "evaluations must be at least 40, one population, got 36"),
         (["run", "sapso", "--set", "foo=1"], "a setting of sapso must be one of .*, got 'foo'"),
     ],
 )  # fmt: skip
@@ -304,13 +304,13 @@ def test_a_mistake_is_reported_in_one_line_and_status_2(
     [
         (
             {"motions": ["walk"]},
-            "a plan of a suite must hold suite, .*, methods, .*, got 'motions'",
+            "a key of a plan of a suite must be one of suite, .*, methods, .*, got 'motions'",
         ),
-        ({"methods": []}, "methods must hold at least one, got none"),
+        ({"methods": []}, "methods must contain at least one, got none"),
         ({"methods": ["sapso@pca"]}, "optimiser must be one of .*, got 'sapso@pca'"),
         (
             {"methods": [{"method": "pso", "colour": 1}]},
-            "a cell must hold suite, .*, got 'colour'",
+            "a key of a cell must be one of suite, .*, got 'colour'",
         ),
         (
             {"methods": [{"method": "pso", "settings": {"particle": 2}}]},
@@ -318,7 +318,7 @@ def test_a_mistake_is_reported_in_one_line_and_status_2(
         ),
         (
             {"budgets": [4]},
-            "evaluations must hold one population of 40, got 36 of sapso",
+            "evaluations must be at least 40, one population, got 36 of sapso",
         ),
         ({"seeds": [1, 1]}, "the cells of a plan must differ, got sapso on f1"),
         (

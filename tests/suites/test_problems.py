@@ -344,11 +344,11 @@ def test_a_copy_of_a_problem_counts_for_itself(
         ),  # type: ignore[arg-type]
         (
             lambda: posefit.Suite(functions=[]),
-            "functions must hold at least one number, got none",
+            "functions must contain at least one number, got none",
         ),
         (
             lambda: posefit.Suite(instances=[]),
-            "instances must hold at least one number, got none",
+            "instances must contain at least one number, got none",
         ),
     ],
 )

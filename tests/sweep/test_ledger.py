@@ -587,7 +587,7 @@ def test_rows_of_another_version_are_read_and_counted_and_their_cells_run_again(
     messages: list[str] = []
     assert swept(cells(3), folder, Instant(), messages.append).ran == 3
     assert messages == [
-        f"{folder}: 2 rows of another version, posefit 0.0.9 a1, not counted"
+        f"{folder}: 2 rows of another version do not count: posefit 0.0.9 a1"
     ]
     with Ledger(folder) as ledger:
         assert len(ledger) == 5

@@ -87,7 +87,7 @@ def test_a_name_that_two_plugins_register_is_checked_once_one_has_another(
     ran = posefit("check", "optimiser", "sapso")
     assert ran.returncode == 2
     assert ran.stderr.endswith(
-        "posefit: optimiser 'sapso' must be of one plugin, got that of posefit, which is used, and that of mine "
+        "posefit: optimiser 'sapso' must be registered by one plugin, got posefit, which is used, and mine "
         "(posefit-mine 1.0), which is left out: give it another name\n"
     )
     assert posefit("check", "optimiser", "pso", "--only", "shape").returncode == 0

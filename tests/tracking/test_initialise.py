@@ -28,9 +28,7 @@ from tests.cases import each
 from tests.testing import planted
 from tests.tracking.scenes import frame_of, masks_of, rows_of, walk
 
-COMPILING = (
-    "compiling the kernels, once on this machine; this takes ten seconds or more ..."
-)
+COMPILING = "compiling kernels for their first use on this machine; this takes ten seconds or more ..."
 
 
 @each("method", [{}, {"method": "annealed"}, {"method": "vsmm"}])

@@ -265,7 +265,7 @@ def test_guesses_about_a_stream_are_logged_and_the_calibrations_unit_counts(
             {},
             [
                 assumed,
-                "a level camera, 40 degrees across: distances and sizes are as good as that",
+                "a level camera, 40 degrees across: distances and sizes are only as good as this guess",
                 person,
             ],
         ),

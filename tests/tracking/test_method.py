@@ -381,7 +381,7 @@ MISUSES: list[tuple[dict[str, Any], str]] = [
     ({"rate": 50.0}, "rate applies only to .amc files, got 50.0"),
     (
         {"evaluations": 30, "method": "sapso"},
-        "evaluations must hold one population of 40, got 30",
+        "evaluations must be at least 40, one population, got 30",
     ),
     (
         {"method": "sapzo"},

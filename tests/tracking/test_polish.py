@@ -57,5 +57,5 @@ def test_a_pose_outside_the_prior_is_reported() -> None:
     raised = built_in.motion("arms-out").poses[0].copy()
     raised[3:][skeleton.free[3:]] += 0.7
     assert beyond_prior(prior, skeleton, raised).startswith(
-        "the prior does not know this pose: the nearest that it knows is "
+        "the prior cannot represent this pose: the nearest that it can represent is "
     )

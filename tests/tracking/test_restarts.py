@@ -270,12 +270,12 @@ def test_interrupted_hypotheses_continue_at_the_last_frame(tmp_path: Path) -> No
         assert [line for line in log if line.startswith("track ")] == new
         going_on = (
             [
-                f"going on from frame {frames} of 3 of track {done + 1} of 3, {names[done]}"
+                f"continuing from frame {frames} of 3 of track {done + 1} of 3, {names[done]}"
             ]
             if frames
             else []
         )
-        assert [line for line in log if line.startswith("going on")] == going_on
+        assert [line for line in log if line.startswith("continuing")] == going_on
         costs = [
             [row["cost"] for row in track.summary["hypotheses"]]
             for track in (whole, resumed)

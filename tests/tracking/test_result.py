@@ -71,7 +71,7 @@ def test_the_same_masks_give_the_same_track(
         (np.zeros((2, 3, 4, 5), bool), "masks must have shape"),
         (np.zeros((2, 6, 8), bool), "a mask with a person"),
         ([np.zeros((6, 8)), np.zeros((8, 6))], "masks must have one shape"),
-        (["missing.png"], "missing.png: expected a file"),
+        (["missing.png"], "missing.png: no such file"),
         (
             np.moveaxis(MASKS, 0, 2),
             "must have shape .frames, height, width., got 3 as the width",
@@ -160,7 +160,7 @@ def test_a_fit_takes_the_first_frame_as_filmed(
         sources if len(sources) > 1 else sources[0], camera=cameras, **chosen, **QUICK
     )
     assert fit.track.table["frame"].tolist() == [number]
-    assert fit.track.gait.why == "one frame is no walk"
+    assert fit.track.gait.why == "one frame is not a walk"
 
 
 def test_files_and_a_page_come_later_too(

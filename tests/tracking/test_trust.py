@@ -172,7 +172,7 @@ def test_a_body_covers_half_of_what_moves() -> None:
             "doubtful: feet touch the ground at heights 0.30 m apart",
         ),
         ({"explained": 0.35}, "do not use: the body covers only 35% of what moves"),
-        ({"acceleration": 30.0}, "doubtful: joints jerk, by 30 m/s2"),
+        ({"acceleration": 30.0}, "doubtful: joints move jerkily, at 30 m/s2"),
         ({"frames": 2}, "doubtful: only 2 frames to judge the person by"),
         (
             {"unknown": 0.3, "lost": 0.4},

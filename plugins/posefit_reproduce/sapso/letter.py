@@ -17,7 +17,7 @@ from posefit.plugin import Array, Space, check_tell, displacement, wrap
 from posefit_swarm.sapso import SAPSO, Rows, redrawn
 
 ALPHA = 0.15  # section 2.2
-# ours: after these the particle stays, at rest. Interpretation S7
+# ours: after these the particle does not move, and its velocity is 0. Interpretation S7
 REDRAWS = 100
 
 

@@ -66,7 +66,7 @@ class Analysis:
         )
 
     def free(self, motion: str) -> NDArray[np.bool_]:
-        """Return which of the 66 angles can err."""
+        """Return which of the 66 angles are free; the errors of the others are 0."""
         return self.motions[motion].test.skeleton.free
 
     def errors(
@@ -163,7 +163,7 @@ def table_1(analysis: Analysis) -> Table:
     """Return table 1: twelve angles of one image, and the mean error.
 
     Our image is the middle frame of the first seed from 45 degrees. Our mean error is
-    over all images and those angles that can err.
+    over all images and all free angles.
     """
     rows = []
     for motion, pair in paper.TABLE_1.items():
@@ -336,7 +336,7 @@ def track_claims(analysis: Analysis, motion: str) -> list[Claim]:
 
 
 def image_claims(analysis: Analysis, motion: str) -> list[Claim]:
-    """Return the claims about single images, by the angles that can err."""
+    """Return the claims about single images, by the free angles."""
     label = MOTIONS[motion]
     away = analysis.away(motion, OURS, "image")
     small = 100.0 * (
@@ -393,7 +393,7 @@ def image_claims(analysis: Analysis, motion: str) -> list[Claim]:
 
 
 def table_1_angles(analysis: Analysis, motion: str, method: str, kind: str) -> Array:
-    """Return the mean errors (views, seeds) of table 1's angles that can err."""
+    """Return the mean errors (views, seeds) of the free angles of table 1."""
     chosen = [angle for angle in ANGLES if analysis.free(motion)[angle]]
     return np.asarray(
         analysis.away(motion, method, kind)[..., chosen].mean(axis=(2, 3))

@@ -156,10 +156,10 @@ def switching_figures(labels: list[int], arrays: Arrays) -> dict[str, float]:
     delays = _delays(labels, right_group)
     activated = []  # the right models of each group that is activated
     for (before, now), wanted in zip(pairwise(candidates), right[1:], strict=True):
-        # -1 is no candidate: the end of a switch, not an activation
+        # -1 means no candidate: the end of a switch, not an activation
         if now not in (-1, before):
             activated.append(models_of[now + 1] & wanted)
-    terminated = []  # whether the right models went out of force
+    terminated = []  # whether the right models are no longer in force
     for (before, now), wanted in zip(pairwise(in_force), right[1:], strict=True):
         terminated.append(bool(before & wanted) and not now & wanted)
     return {

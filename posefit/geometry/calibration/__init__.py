@@ -9,7 +9,7 @@
 | text, numbers and tables in YAML, JSON, TOML and XML | values.py |
 | unknown keys: whether they may describe the lens or the place | keys.py |
 
-A file holds one camera or several; `cameras.toml:left` is the camera named left. All
+A file contains one camera or several; `cameras.toml:left` is the camera named left. All
 cameras become camera_from_world in OpenCV's frame: x right, y down and z forward.
 
 The up direction of the file's world is turned to +y. It is `up` if that is given, or

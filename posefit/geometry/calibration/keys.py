@@ -1,7 +1,7 @@
 """Unknown keys: whether, by their names, they describe the lens or the place.
 
 The keys that a program writes are listed with its dialect. Users choose names too, or
-add values. An unknown key that holds numbers is an error, unless its name says that
+add values. An unknown key with numbers is an error, unless its name says that
 they describe neither the lens nor the place.
 """
 

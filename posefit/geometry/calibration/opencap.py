@@ -1,7 +1,7 @@
 """OpenCap's cameraIntrinsicsExtrinsics, converted to JSON; lengths are millimetres.
 
-OpenCap writes a pickle. Reading a pickle may run any code, so that posefit refuses it
-with a message that says how to convert it.
+OpenCap writes a pickle. Reading a pickle may run any code, so posefit refuses it with a
+message that says how to convert it.
 """
 
 import numpy as np

@@ -6,7 +6,7 @@ difference. A camera is a table with a camera matrix, or with fx, fy and its cen
 file is one camera, or has several in tables or lists. Rotation and translation are from
 the world to the camera.
 
-An unknown key that holds numbers is an error, unless its name says that they describe
+An unknown key with numbers is an error, unless its name says that they describe
 neither the lens nor the place; see keys.py.
 """
 
@@ -240,7 +240,7 @@ def _size(known: Mapping[str, Any]) -> list[float] | None:
 
 
 def _is_text(value: Any) -> bool:
-    """Return whether a value is a text that is no number."""
+    """Return whether a value is a text and not a number."""
     return isinstance(value, str) and not counts(value)
 
 

@@ -70,9 +70,7 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
         path = Path(before)
         chosen = after
     if not path.is_file():
-        raise InputError(
-            f"{path}: expected a calibration file, got nothing of that name"
-        )
+        raise InputError(f"{path}: no such file")
     if path.suffix.lower() in PICKLES:
         raise InputError(f"{path}: expected a calibration as text, got {HOW}")
     text = read_text(path, LARGEST_FILE)

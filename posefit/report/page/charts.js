@@ -190,7 +190,7 @@ function certainty() {
   const { levels, methods } = D.certainty;
   const share = (value) => `${number(100 * value, 1)} %`;
   const percents = (value) => `${whole(100 * value)} %`;
-  const within = (level) => `Share of true joints inside the balls that should hold ${percents(level)} of them`;
+  const within = (level) => `Share of true joints inside the balls that should contain ${percents(level)} of them`;
   const columns = levels.flatMap((level, k) => [
     column(`within ${percents(level)}`, ({ coverage }) => coverage[k], share, { about: within(level) }),
     column("mm", ({ width }) => width[k], whole, { about: "Mean radius of these balls" }),

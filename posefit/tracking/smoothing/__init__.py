@@ -1,4 +1,4 @@
-"""Smoothing of a track: no shaking, planted feet, contours that match the masks.
+"""Smoothing of a track: no jitter, planted feet, contours that match the masks.
 
 | looking for | file |
 |---|---|

@@ -1,9 +1,9 @@
 """Poses, path and build fitted to the contours of masks, over all frames at once.
 
-A tracker's estimate is one of the poses that it knows, and a search in each frame makes
-it shake. Here least squares adjust every angle a little, and smoothly, to the contours
-of the masks. The build, and small turns of several cameras, are fitted too. They are
-the same in all frames.
+A tracker's estimate is one of its known poses, and it jitters because each frame is
+searched anew. Here least squares adjust every angle a little, and smoothly, to the
+contours of the masks. The build, and small turns of several cameras, are fitted too.
+They are the same in all frames.
 """
 
 import threading
@@ -158,7 +158,7 @@ class _Part:
     visibility: Visibility
     spread: Array  # (17,) standard deviations of these logarithms
     cameras: Sequence[Camera]
-    # (V, 3) radians, the turn of the world in each camera; (0, 3) if cameras stay
+    # (V, 3) radians, the turn of the world in each camera; (0, 3) if none is turned
     turns: Array
 
 

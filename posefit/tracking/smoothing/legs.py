@@ -60,8 +60,8 @@ def with_cheapest_legs(
 ) -> tuple[Smoothed, NDArray[np.bool_]]:
     """Return smoothed frames with legs exchanged wherever that is cheaper.
 
-    If legs are exchanged in a fifth of the frames, it stays open whether this sequence
-    is right or the one with left and right exchanged. The posteriors then have both.
+    If legs are exchanged in a fifth of the frames, either this sequence is right or the
+    one with left and right exchanged. The posteriors then have both.
 
     Args:
         tracked: The tracked frames.
@@ -182,7 +182,7 @@ def _cheapest_exchanges(
     """
     starts = [0, *edges]
     stops = [*edges, len(exchanged)]
-    # each stretch between edges stays as the trials have it, or is the other way round
+    # each stretch between edges is as in the trials, or exchanged
     stretches = np.add.reduceat(np.where(exchanged, -1.0, 1.0) * added, starts)
     steps = np.reshape(switches, (-1, 1, 1)) * (1.0 - np.eye(2))
     both_costs = np.column_stack([np.zeros(len(starts)), stretches])

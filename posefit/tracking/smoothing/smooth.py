@@ -134,8 +134,8 @@ def smoothed_motion(
 def steadied(motion: Motion, visibility: Visibility) -> Motion:
     """Return a motion with filtered angles in the frames that a single camera sees.
 
-    The silhouettes of a single camera leave most open, so that angles shake from one
-    frame to the next. The filter is a Gaussian over time.
+    The silhouettes of a single camera do not determine the angles, which therefore
+    jitter from one frame to the next. The filter is a Gaussian over time.
     """
     from scipy.ndimage import gaussian_filter1d
 
