@@ -448,6 +448,6 @@ class HypothesisProposals:
         for limb in LIMB_ANGLES * LIMB_ROUNDS:
             poses = np.repeat(pose, LIMB_POSES + 1, axis=0)
             drawn = self._exemplars.draw(LIMB_POSES, rng)
-            poses[1:, limb] = self._exemplars.poses[drawn][:, limb]
+            poses[1:, limb] = self._exemplars.angles[drawn][:, limb]
             pose = poses[frame_costs.full(poses, places).argmin()][None]
         return pose, place
