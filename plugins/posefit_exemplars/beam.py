@@ -38,17 +38,27 @@ class Beam:
         )
 
 
-def diverse_best(exemplars: Exemplars, beam: Beam, totals: Array, count: int) -> Rows:
-    """Return the `count` states of least `totals` (n,), with few similar ones.
+def diverse_best(
+    exemplars: Exemplars, states: Rows, yaws: Array, totals: Array, count: int
+) -> Rows:
+    """Return the rows of the `count` states of least totals, with few similar ones.
 
     Of states with equal poses and yaw bins only the cheapest is kept. Of the states
     with similar poses and yaws only the best few are kept: the right alternative often
     costs more for a while, until later silhouettes confirm it.
+
+    Args:
+        exemplars: The poses of clips.
+        states: (n,) poses of the exemplars.
+        yaws: (n,) radians.
+        totals: (n,) the cost of the best path to each state.
+        count: How many states, at most.
+
     """
-    bins = yaw_bins(beam.yaws)
+    bins = yaw_bins(yaws)
     order = np.argsort(totals, kind="stable")
-    keys = beam.states * YAW_BINS + bins
-    kinds = exemplars.coarse_groups[beam.states] * YAW_BINS + bins
+    keys = states * YAW_BINS + bins
+    kinds = exemplars.coarse_groups[states] * YAW_BINS + bins
     share = max(count // BEAM_SHARES, 1)
     rows: Rows = kernels.first_distinct(order, keys, kinds, share, count)
     return rows

@@ -204,11 +204,15 @@ class ClipPath:
         """
         rough = self._costs.of_small(frame_costs, poses, beam.places)
         used += len(beam)
-        rows = diverse_best(self.exemplars, beam, beam.totals + rough, full)
+        rows = diverse_best(
+            self.exemplars, beam.states, beam.yaws, beam.totals + rough, full
+        )
         beam = beam.rows(rows)
         poses = poses[rows]
         costs = self._costs.of_poses(frame_costs, poses, beam.places)
-        best = diverse_best(self.exemplars, beam, beam.totals + costs, BEAM_STATES)
+        best = diverse_best(
+            self.exemplars, beam.states, beam.yaws, beam.totals + costs, BEAM_STATES
+        )
         evaluations = used * frame_costs.small_share + len(beam)
         return beam.rows(best), costs[best], evaluations
 
@@ -241,7 +245,9 @@ class ClipPath:
         """
         beam = frame.beam
         frame_costs = frame.frame_costs
-        diverse = beam.rows(diverse_best(self.exemplars, beam, beam.totals, count))
+        diverse = beam.rows(
+            diverse_best(self.exemplars, beam.states, beam.yaws, beam.totals, count)
+        )
         pose = self.exemplars.with_yaws(beam.states[[row]], beam.yaws[[row]])[0]
         place = beam.places[row]
         if frame_costs.usable:

@@ -100,16 +100,16 @@ def next_states(exemplars: Exemplars, steps: ClipSteps, count: int) -> Beam:
     # In order before they are repeated: three runs in order are merged in a fraction of
     # the time that it takes to sort them.
     order = np.argsort(totals, kind="stable")
-    order = np.tile(order, len(CANDIDATE_TURNS))
     states = states[order]
     parents = parents[order]
-    totals = totals[order]
-    spreads = np.repeat(CANDIDATE_TURNS, len(states) // len(CANDIDATE_TURNS))
-    turns = steps.step.turn * spreads
-    totals = totals + steps.turn_costs(turns)
-    yaws = steps.yaws[parents] + turns
-    reached = Beam(states, yaws, totals, steps.places.take(parents, axis=0))
-    return reached.rows(diverse_best(exemplars, reached, totals, count))
+    turns = steps.step.turn * np.array(CANDIDATE_TURNS)[:, None]
+    # turn by turn
+    states = np.tile(states, len(turns))
+    yaws = (steps.yaws[parents] + turns).ravel()
+    totals = (totals[order] + steps.turn_costs(turns)).ravel()
+    rows = diverse_best(exemplars, states, yaws, totals, count)
+    places = steps.places[parents[rows % len(parents)]]
+    return Beam(states[rows], yaws[rows], totals[rows], places)
 
 
 def fresh_count(evaluations: float) -> int:
@@ -448,6 +448,6 @@ class HypothesisProposals:
         for limb in LIMB_ANGLES * LIMB_ROUNDS:
             poses = np.repeat(pose, LIMB_POSES + 1, axis=0)
             drawn = self._exemplars.draw(LIMB_POSES, rng)
-            poses[1:, limb] = self._exemplars.poses[drawn][:, limb]
+            poses[1:, limb] = self._exemplars.angles[drawn][:, limb]
             pose = poses[frame_costs.full(poses, places).argmin()][None]
         return pose, place

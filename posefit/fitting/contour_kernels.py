@@ -47,13 +47,6 @@ CAP = 2  # points on one half of the arc at a bone's end
 # another bone
 COVERED = 0.25
 TINY = 1e-9
-# Columns of a row of `cones`: centre and radius of the first disc; the direction to the
-# last disc's centre, and its distance; how much less the last radius is; the tangent of
-# the angle that the sides have with the axis; and 1 over the length of the bone, 0 if
-# one disc covers the other. A distance needs these numbers: each cone gets many
-# distances, and divisions and roots take longest.
-X0, Y0, R0, AXIS_X, AXIS_Y, LENGTH, TAPER, TANGENT, INVERSE = range(9)
-CONE = 9  # columns
 # A bone has six numbers: the columns and rows of its first and its last disc, then both
 # radii. Row 0 has the indices of the first disc's column, row and radius.
 NUMBERS_OF_END = np.array([[0, 1, 4], [2, 3, 5]])
@@ -113,12 +106,39 @@ class Pulls(NamedTuple):
     precisions: Array  # (m,)
 
 
-class Bones(NamedTuple):
-    """The drawn bones of one view."""
+class Cone(NamedTuple):
+    """A drawn bone: the numbers from which distances follow.
 
-    cones: Array  # (B, CONE) with columns from X0 to INVERSE
-    discs: Array  # (B, 3) a disc around each bone: its centre and radius
-    neighbours: NDArray[np.int64]  # (n,) bones that may hide a bone's border
+    A cone gets many distances. Divisions and roots take longest, and are done once.
+    """
+
+    x: float  # centre of the first disc, pixels
+    y: float
+    radius: float  # of the first disc
+    axis_x: float  # direction to the centre of the last disc
+    axis_y: float
+    length: float  # distance between both centres
+    taper: float  # how much less the last radius is
+    tangent: float  # of the angle that the sides have with the axis
+    inverse: float  # 1 over the length, or 0 if one disc covers the other
+
+
+CONE = len(Cone._fields)
+
+
+class Points(NamedTuple):
+    """Points on the border of a drawn bone.
+
+    Each number has an array (P,), so that loops over points run in vector registers.
+    """
+
+    columns: Array  # pixels
+    rows: Array
+    normal_columns: Array  # the normal of the border, out of the bone
+    normal_rows: Array
+    shares: Array  # 0 at the bone's first disc, 1 at its last
+    lengths: Array  # pixels of the border that a point represents
+    hidden: NDArray[np.bool_]  # whether another bone covers it
 
 
 class Growth(NamedTuple):
@@ -148,7 +168,7 @@ class BoneSquares(NamedTuple):
 
 @jit
 def write_cones(parents, centres, radii, cones, discs):
-    """Write `cones` (B, CONE), from which distances follow, and `discs` (B, 3).
+    """Write the numbers of `cones` (B, CONE), and `discs` (B, 3).
 
     A disc encloses its bone. Its three numbers are its centre and radius.
     """
@@ -162,21 +182,26 @@ def write_cones(parents, centres, radii, cones, discs):
         dr = r0 - r1
         square = dx * dx + dy * dy
         length = math.sqrt(square)
-        cones[b, X0] = x
-        cones[b, Y0] = y
-        cones[b, R0] = r0
-        cones[b, AXIS_X] = dx / max(length, TINY)
-        cones[b, AXIS_Y] = dy / max(length, TINY)
-        cones[b, LENGTH] = length
-        cones[b, TAPER] = dr
-        cones[b, TANGENT] = 0.0
-        cones[b, INVERSE] = 0.0
+        tangent = 0.0
+        inverse = 0.0
         if square > dr * dr + TINY:
-            cones[b, TANGENT] = dr / math.sqrt(square - dr * dr)
-            cones[b, INVERSE] = 1.0 / length
+            tangent = dr / math.sqrt(square - dr * dr)
+            inverse = 1.0 / length
+        axis_x = dx / max(length, TINY)
+        axis_y = dy / max(length, TINY)
+        cone = Cone(x, y, r0, axis_x, axis_y, length, dr, tangent, inverse)
+        for k in range(CONE):
+            cones[b, k] = cone[k]
         discs[b, 0] = x + 0.5 * dx
         discs[b, 1] = y + 0.5 * dy
         discs[b, 2] = 0.5 * length + max(r0, r1)
+
+
+@inlined
+def cone_of(cones, b):
+    """Return the cone of bone b."""
+    row = cones[b]
+    return Cone(row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8])
 
 
 @inlined
@@ -188,18 +213,17 @@ def _nearest_disc(x, y, cone):
         radius.
 
     """
-    x -= cone[X0]
-    y -= cone[Y0]
-    axis_x = cone[AXIS_X]
-    axis_y = cone[AXIS_Y]
-    along = x * axis_x + y * axis_y
-    across = abs(y * axis_x - x * axis_y)
-    share = (along - across * cone[TANGENT]) * cone[INVERSE]
-    if cone[INVERSE] == 0.0 and cone[TAPER] < 0.0:
+    x -= cone.x
+    y -= cone.y
+    along = x * cone.axis_x + y * cone.axis_y
+    across = abs(y * cone.axis_x - x * cone.axis_y)
+    share = (along - across * cone.tangent) * cone.inverse
+    if cone.inverse == 0.0 and cone.taper < 0.0:
         share = 1.0
     share = min(max(share, 0.0), 1.0)
-    part = share * cone[LENGTH]
-    return share, x - part * axis_x, y - part * axis_y, cone[R0] - share * cone[TAPER]
+    part = share * cone.length
+    radius = cone.radius - share * cone.taper
+    return share, x - part * cone.axis_x, y - part * cone.axis_y, radius
 
 
 @inlined
@@ -219,7 +243,7 @@ def _nearer(x, y, cone, distance):
     """Return whether a point is nearer to a cone than a distance, without a root."""
     _, ox, oy, radius = _nearest_disc(x, y, cone)
     reach = radius + distance
-    return reach > 0.0 and ox * ox + oy * oy < reach * reach
+    return (reach > 0.0) & (ox * ox + oy * oy < reach * reach)
 
 
 @inlined
@@ -271,15 +295,15 @@ def expand(products, hessians, gradients):
 @inlined
 def _nearest_bone(x, y, first, cones, discs):
     """Return the bone with the border nearest to a point, searching from `first` on."""
-    least = cone_distance(x, y, cones[first])[0]
+    least = cone_distance(x, y, cone_of(cones, first))[0]
     bone = first
     for b in range(discs.shape[0]):
         reach = least + discs[b, 2]
         dx = x - discs[b, 0]
         dy = y - discs[b, 1]
         near = b != first and dx * dx + dy * dy < reach * reach
-        if near and _nearer(x, y, cones[b], least):
-            least = cone_distance(x, y, cones[b])[0]
+        if near and _nearer(x, y, cone_of(cones, b), least):
+            least = cone_distance(x, y, cone_of(cones, b))[0]
             bone = b
     return bone
 
@@ -298,27 +322,15 @@ def _write_neighbours(bone, discs, neighbours):
 
 
 @inlined
-def visible(x, y, bones):
-    """Return whether a point of a bone's border is visible: no neighbour covers it.
-
-    A neighbour that covers it becomes the first one, because it often covers the next
-    point, too.
-    """
-    cones = bones.cones
-    discs = bones.discs
-    neighbours = bones.neighbours
-    shown = True
-    for i in range(neighbours.size):
-        b = neighbours[i]
-        dx = x - discs[b, 0]
-        dy = y - discs[b, 1]
-        near = dx * dx + dy * dy < discs[b, 2] * discs[b, 2]
-        if near and _nearer(x, y, cones[b], -COVERED):
-            neighbours[i] = neighbours[0]
-            neighbours[0] = b
-            shown = False
-            break
-    return shown
+def hide(points, count, cone):
+    """Mark those of the first `count` points as hidden that a cone covers."""
+    # Out of the loop: an array that is taken from a tuple changes its reference count,
+    # which keeps the loop from vector registers.
+    columns = points.columns
+    rows = points.rows
+    hidden = points.hidden
+    for k in range(count):
+        hidden[k] |= _nearer(columns[k], rows[k], cone, -COVERED)
 
 
 @jit
@@ -337,13 +349,16 @@ def accumulate_borders(parents, centres, radii, contour, scale, hessians, gradie
     products = np.zeros((count, PRODUCTS))
     _accumulate_mask_border(contour, scale, cones, discs, products)
     neighbours = np.empty(count, np.int64)
+    points = empty_points(cones, contour.step)
     for b in range(count):
         # otherwise one disc covers the other
-        if cones[b, LENGTH] > abs(cones[b, TAPER]) + TINY:
-            others = neighbours[: _write_neighbours(b, discs, neighbours)]
-            bones = Bones(cones, discs, others)
-            side_points(cones[b], contour, scale, bones, products[b])
-            cap_points(cones[b], contour, scale, bones, products[b])
+        cone = cone_of(cones, b)
+        if cone.length > abs(cone.taper) + TINY:
+            on_sides = write_side_points(cone, contour.step, points)
+            drawn = write_cap_points(cone, points, on_sides)
+            for i in range(_write_neighbours(b, discs, neighbours)):
+                hide(points, drawn, cone_of(cones, neighbours[i]))
+            _accumulate_points(points, drawn, contour, scale, products[b])
     expand(products, hessians, gradients)
 
 
@@ -362,79 +377,119 @@ def _accumulate_mask_border(contour, scale, cones, discs, products):
         first = owners[i] if owners[i] >= 0 else bone
         bone = _nearest_bone(x, y, first, cones, discs)
         owners[i] = bone
-        distance, share, nx, ny = cone_distance(x, y, cones[bone])
+        distance, share, nx, ny = cone_distance(x, y, cone_of(cones, bone))
         weight = contour.step / (1.0 + (distance / scale) ** 2)  # contour (6)
         slope = -nx, -ny, -1.0  # contour (2)
         accumulate(products[bone], share, slope, distance, weight)
 
 
 @inlined
-def _accumulate_point(disc, normal, length, contour, scale, bones, products):
-    """Add the squared distance of a visible point of a bone's border from the mask's.
-
-    `disc` is a share of the bone, and the centre and radius there. The point is where
-    the `normal` meets the border of this disc. It represents a `length` of border, in
-    pixels. A point that is hidden, or outside the field, adds nothing.
-    """
-    share, u, v, radius = disc
-    nx, ny = normal
-    x = u + radius * nx  # contour (3)
-    y = v + radius * ny
-    if visible(x, y, bones):
-        known, distance, slope_x, slope_y = field_distance(x, y, contour)
-        if known:
-            weight = length / (1.0 + (distance / scale) ** 2)  # contour (6)
-            slope = slope_x, slope_y, slope_x * nx + slope_y * ny  # contour (4)
-            accumulate(products, share, slope, distance, weight)
+def side_pieces(length, step):
+    """Return into how many pieces each side of a bone is cut: two at least."""
+    return max(int(length / (2.0 * step)) + 1, 2)
 
 
 @inlined
-def side_points(cone, contour, scale, bones, products):
-    """Add the squared distances of points on the two sides of a bone's border.
+def empty_points(cones, step):
+    """Return `Points` with room for those of the longest bone."""
+    longest = 0.0
+    for b in range(cones.shape[0]):
+        longest = max(longest, cone_of(cones, b).length)
+    room = 2 * (side_pieces(longest, step) + 1) + 4 * CAP
+    numbers = np.empty((6, room))
+    return Points(
+        numbers[0],
+        numbers[1],
+        numbers[2],
+        numbers[3],
+        numbers[4],
+        numbers[5],
+        np.empty(room, np.bool_),
+    )
+
+
+@inlined
+def _write_point(points, k, cone, share, normal, length):
+    """Write point k, where the `normal` meets the disc at a share of a bone."""
+    nx, ny = normal
+    radius = cone.radius - share * cone.taper
+    part = share * cone.length
+    points.columns[k] = cone.x + part * cone.axis_x + radius * nx  # contour (3)
+    points.rows[k] = cone.y + part * cone.axis_y + radius * ny
+    points.normal_columns[k] = nx
+    points.normal_rows[k] = ny
+    points.shares[k] = share
+    points.lengths[k] = length
+    points.hidden[k] = False
+
+
+@inlined
+def write_side_points(cone, step, points):
+    """Write points on the two sides of a bone's border. Return their number.
 
     The sides are the segments that touch both discs.
     """
-    length = cone[LENGTH]
-    dx = cone[AXIS_X]
-    dy = cone[AXIS_Y]
-    cosine = cone[TAPER] / length
+    length = cone.length
+    dx = cone.axis_x
+    dy = cone.axis_y
+    cosine = cone.taper / length
     sine = math.sqrt(1.0 - cosine * cosine)
-    pieces = max(int(length / (2.0 * contour.step)) + 1, 2)
+    pieces = side_pieces(length, step)
     for i in range(pieces + 1):
         share = i / pieces
         # the first and the last point have only one neighbour: half a piece each
         piece = length * sine / pieces * (0.5 if i in (0, pieces) else 1.0)
-        radius = cone[R0] - share * cone[TAPER]
-        u = cone[X0] + share * length * dx
-        v = cone[Y0] + share * length * dy
-        disc = share, u, v, radius
-        for across in (sine, -sine):
+        for side in range(2):
+            across = sine if side == 0 else -sine
             normal = cosine * dx - across * dy, cosine * dy + across * dx
-            _accumulate_point(disc, normal, piece, contour, scale, bones, products)
+            _write_point(points, 2 * i + side, cone, share, normal, piece)
+    return 2 * (pieces + 1)
 
 
 @inlined
-def cap_points(cone, contour, scale, bones, products):
-    """Add the squared distances of points on the two arcs of a bone's border."""
-    length = cone[LENGTH]
-    dx = cone[AXIS_X]
-    dy = cone[AXIS_Y]
+def write_cap_points(cone, points, count):
+    """Write points on the two arcs of a bone's border, after `count` others.
+
+    Returns:
+        The number of all points.
+
+    """
+    dx = cone.axis_x
+    dy = cone.axis_y
     # the angle from the axis to the normal of the cone's side
-    tilt = math.acos(cone[TAPER] / length)
+    tilt = math.acos(cone.taper / cone.length)
     # the arc of the last disc is around the axis, the arc of the first around its
     # opposite
     for share, start, arc in ((1.0, 0.0, tilt), (0.0, tilt, math.pi - tilt)):
-        radius = cone[R0] - share * cone[TAPER]
-        u = cone[X0] + share * length * dx
-        v = cone[Y0] + share * length * dy
-        disc = share, u, v, radius
+        radius = cone.radius - share * cone.taper
         piece = radius * arc / CAP
         for i in range(CAP):
-            angle = start + arc * ((i + 0.5) / CAP)
-            sine, along = sine_cosine(angle)
+            sine, along = sine_cosine(start + arc * ((i + 0.5) / CAP))
             for across in (sine, -sine):
                 normal = along * dx - across * dy, along * dy + across * dx
-                _accumulate_point(disc, normal, piece, contour, scale, bones, products)
+                _write_point(points, count, cone, share, normal, piece)
+                count += 1
+    return count
+
+
+@inlined
+def _accumulate_points(points, count, contour, scale, products):
+    """Add the squared distances of a bone's visible points from the mask's border.
+
+    A point that is hidden, or outside the field, adds nothing.
+    """
+    for k in range(count):
+        if points.hidden[k]:
+            continue
+        x = points.columns[k]
+        y = points.rows[k]
+        known, distance, slope_x, slope_y = field_distance(x, y, contour)
+        if known:
+            # contour (6)
+            weight = points.lengths[k] / (1.0 + (distance / scale) ** 2)
+            along = slope_x * points.normal_columns[k] + slope_y * points.normal_rows[k]
+            slope = slope_x, slope_y, along  # contour (4)
+            accumulate(products, points.shares[k], slope, distance, weight)
 
 
 @inlined
@@ -454,12 +509,10 @@ def field_distance(x, y, contour):
     if 0 <= left < contour.size[1] - 1 and 0 <= top < contour.size[0] - 1:
         u = column - left
         v = row - top
-        upper = contour.field[top]
-        lower = contour.field[top + 1]
-        f00 = upper[left]
-        f01 = upper[left + 1]
-        f10 = lower[left]
-        f11 = lower[left + 1]
+        f00 = contour.field[top, left]
+        f01 = contour.field[top, left + 1]
+        f10 = contour.field[top + 1, left]
+        f11 = contour.field[top + 1, left + 1]
         off = (f00 * (1.0 - u) + f01 * u) * (1.0 - v) + (f10 * (1.0 - u) + f11 * u) * v
         across = (f01 - f00) * (1.0 - v) + (f11 - f10) * v
         down = (f10 - f00) * (1.0 - u) + (f11 - f01) * u

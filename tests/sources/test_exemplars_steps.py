@@ -129,7 +129,7 @@ def test_a_step_is_as_likely_as_it_is_frequent_in_the_clips() -> None:
     after = int(clips.last_states[0])
     for state in range(after):
         seconds = float(clips.times[state + 1] - clips.times[state])
-        yaws = clips.poses[[state, state + 1], 0]
+        yaws = clips.angles[[state, state + 1], 0].astype(float)
         before = Beam(np.array([state]), yaws[:1], np.zeros(1), clips.places[[state]])
         beams = Beam(
             np.array([state + 1, after]),

@@ -106,7 +106,7 @@ def cone_distance(
     kernels.write_cones(
         np.zeros(1, int), np.asarray(points), np.asarray(radii)[None], cones, discs
     )
-    distance, *others = kernels.cone_distance(x, y, cones[0])
+    distance, *others = kernels.cone_distance(x, y, kernels.cone_of(cones, 0))
     return distance, *others
 
 

@@ -19,7 +19,6 @@ from posefit.motion.motion import Motion
 from posefit.motion.steadiness import BALLS, low, runs
 from posefit.silhouette.cost import only_camera
 
-BAND_REACH = 2  # a frame has terms with this many frames to either side
 SECOND_DIFFERENCE = np.array([1.0, -2.0, 1.0])
 
 
@@ -27,8 +26,10 @@ class Squares:
     """Half the Hessian and gradient of a sum of squares, in T frames of n numbers."""
 
     def __init__(self, frames: int, numbers: int) -> None:
-        # a frame with itself, with the next one, and with the one after that
-        self.hessians = np.zeros((BAND_REACH + 1, frames, numbers, numbers))
+        # a frame with itself, and with the next one
+        self.hessians = np.zeros((2, frames, numbers, numbers))
+        # each number with itself two frames later; second differences join no others
+        self.two_later = np.zeros((frames, numbers))
         self.gradients = np.zeros((frames, numbers))
 
     def add(self, which: slice, precise: Array, gradients: Array) -> None:
@@ -62,7 +63,11 @@ class Squares:
                 square = (
                     weight**2 * SECOND_DIFFERENCE[first] * SECOND_DIFFERENCE[second]
                 )
-                self.hessians[second - first, frames, diagonal, diagonal] += square
+                apart = second - first
+                if apart == 2:
+                    self.two_later[frames, which] += square
+                else:
+                    self.hessians[apart, frames, diagonal, diagonal] += square
 
     def add_steps(
         self,
@@ -100,21 +105,18 @@ class Squares:
         from scipy.linalg import solveh_banded
 
         _, count, numbers, _ = self.hessians.shape
-        band = (BAND_REACH + 1) * numbers
-        # SciPy's upper form: lines[band - 1 + row - column, column]. It is laid out by
-        # columns, as LAPACK takes it: another layout would be copied twice.
-        columns_first = np.zeros((count, numbers, band))
-        lines = columns_first.transpose(2, 0, 1)
-        rows, columns = np.indices((numbers, numbers)).reshape(2, -1)
-        for apart in range(BAND_REACH + 1):
-            off = apart * numbers + columns - rows
-            upper = off >= 0
-            row = rows[upper]
-            column = columns[upper]
-            values = self.hessians[apart, : count - apart, row, column]
-            lines[band - 1 - off[upper], apart:, column] = values
+        band = 2 * numbers + 1
+        # SciPy's upper form, by columns, as LAPACK takes it: another layout would be
+        # copied twice. A column ends with its diagonal, and begins `band` rows before.
+        lines = np.zeros((count, numbers, band))
+        for column in range(numbers):
+            line = lines[:, column]  # (T, band)
+            own = 2 * numbers - column  # where the rows of the same frame begin
+            line[:, own:] = self.hessians[0, :, : column + 1, column]
+            line[1:, own - numbers : own] = self.hessians[1, :-1, :, column]
+            line[2:, 0] = self.two_later[:-2, column]
         steps = solveh_banded(
-            columns_first.reshape(-1, band).T,
+            lines.reshape(-1, band).T,
             gradients.reshape(count * numbers, -1),
             overwrite_ab=True,
             check_finite=False,
