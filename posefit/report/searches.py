@@ -49,6 +49,12 @@ def _hits(run: SuiteRun) -> Array:
     return hits((run.evaluations, run.costs), run.targets)
 
 
+def _figures(run: SuiteRun, hits_of_run: Array) -> dict[str, float]:
+    """Return the share of targets that a run reached, and its cost above the truth."""
+    reached = 100.0 * float(np.isfinite(hits_of_run).mean())
+    return {"reached": reached, "above": run.cost - run.truth_cost}
+
+
 _REACHED = Measure(
     "reached", "targets", "%", 1, "Share of all runs and targets that were reached"
 )
@@ -90,14 +96,14 @@ class Searches:
     def computed(self, row: Row, /) -> dict[str, float]:
         """Return the share of targets that a row reached, and its cost above."""
         run = search_run(row)
-        reached = 100.0 * float(np.isfinite(_hits(run)).mean())
-        return {"reached": reached, "above": run.cost - run.truth_cost}
+        return _figures(run, _hits(run))
 
     def read(self, row: Row, /) -> tuple[Array, dict[str, Any]]:
         """Return the figures of a row, its run, and its evaluations to each target."""
         run = search_run(row)
-        figures = np.array(list(self.computed(row).values()))
-        return figures, {"runs": run, "hits": _hits(run)}
+        hits_of_run = _hits(run)
+        figures = np.array([*_figures(run, hits_of_run).values()])
+        return figures, {"runs": run, "hits": hits_of_run}
 
     def instance_order(self, fields: InstanceFields) -> tuple[Any, ...]:
         """Return the key by which instances are sorted."""
