@@ -150,7 +150,7 @@ def runs_of(
         figures[name] = np.array(rows.figures.pop(name), dtype=np.float64)[numbers]
     data = {}
     for name, store in rows.data.items():
-        data[name] = Ordered[Any](store, numbers)
+        data[name] = Ordered(store, numbers)
     warnings = {}
     if rows.warnings:
         for k, number in enumerate(numbers.tolist()):
