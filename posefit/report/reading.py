@@ -2,7 +2,7 @@
 
 from array import array
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -53,6 +53,13 @@ class _Distinct:
             self._numbers[key] = len(self.values)
             self.values.append(value)
         return self._numbers[key]
+
+
+class _Ranked(NamedTuple):
+    """Distinct numbers in an order, and for each value (n,) its place among them."""
+
+    numbers: list[int]
+    places: Array
 
 
 class _Rows:
@@ -137,11 +144,10 @@ def runs_of(
     # the rows of these methods, sorted by instance, method and seed
     method_of_row = np.array(rows.method, dtype=np.int64)
     numbers = np.flatnonzero(np.isin(method_of_row, chosen))
-    finished, method = _ranked(method_of_row[numbers], chosen.index)
-    instance_numbers = np.array(rows.instance)[numbers]
-    instance_order, instance = _ranked(instance_numbers, instance_key)
-    seed_order, seed = _ranked(np.array(rows.seed)[numbers], seeds.__getitem__)
-    order = np.lexsort((seed, method, instance))
+    method = _ranked(method_of_row[numbers], chosen.index)
+    instance = _ranked(np.array(rows.instance)[numbers], instance_key)
+    seed = _ranked(np.array(rows.seed)[numbers], seeds.__getitem__)
+    order = np.lexsort((seed.places, method.places, instance.places))
     numbers = numbers[order]
 
     figures = {}
@@ -160,18 +166,18 @@ def runs_of(
     for m, cell in rows.quarantined:
         if m in chosen:
             failures.append(_failure(cell, label_of[m]))
-    instance_fields = [rows.instances.values[number] for number in instance_order]
+    instance_fields = [rows.instances.values[number] for number in instance.numbers]
     return Runs(
         kind=kind,
         version=ledger.version,
-        methods=tuple(label_of[m] for m in finished),
-        variants=tuple(variants[m] for m in finished),
+        methods=tuple(label_of[m] for m in method.numbers),
+        variants=tuple(variants[m] for m in method.numbers),
         instances=_instance_names(kind, instance_fields),
         instance_fields=tuple(instance_fields),
-        method=method[order],
-        instance=instance[order],
-        seed=seed[order],
-        seeds=tuple(seeds[k] for k in seed_order),
+        method=method.places[order],
+        instance=instance.places[order],
+        seed=seed.places[order],
+        seeds=tuple(seeds[k] for k in seed.numbers),
         keys=np.frombuffer(rows.keys, f"S{KEY_LENGTH}")[numbers],
         figures=figures,
         data=data,
@@ -186,23 +192,13 @@ def is_of(runs: Runs, spec: Mapping[str, Any]) -> bool:
     return json_of(_variant(spec)) in runs.chosen
 
 
-def _ranked(
-    values: "NDArray[np.int64]", key: Callable[[int], Any]
-) -> tuple[list[int], Array]:
-    """Return the distinct values in the order of a key, and each value's place there.
-
-    Args:
-        values: Whole numbers (n,).
-        key: Returns the key of a value.
-
-    Returns:
-        The distinct values, and the places (n,).
-    """
+def _ranked(values: "NDArray[np.int64]", key: Callable[[int], Any]) -> _Ranked:
+    """Return the distinct ones of some numbers (n,) in the order of a key."""
     distinct_values, number = np.unique(values, return_inverse=True)
     ordered = sorted(distinct_values.tolist(), key=key)
     rank = np.empty(len(ordered), dtype=np.int64)
     rank[np.searchsorted(distinct_values, ordered)] = np.arange(len(ordered))
-    return ordered, np.asarray(rank[number])
+    return _Ranked(ordered, np.asarray(rank[number]))
 
 
 def _read(ledger: "Ledger") -> _Rows:

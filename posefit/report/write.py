@@ -112,8 +112,8 @@ def _check_paths(ledgers: Sequence[str | Path], outputs: Mapping[str, str]) -> N
         ledgers: The ledgers that are read.
         outputs: The path of each output by its option.
     """
-    out = outputs.get("--out", ".html")
-    if Path(out).suffix.lower() not in (".html", ".htm"):
+    out = outputs.get("--out")
+    if out is not None and Path(out).suffix.lower() not in (".html", ".htm"):
         raise InputError(f"--out must be a file that ends in .html, got {cut(out)}")
     for option, mark in MARKS.items():
         if option in outputs:

@@ -367,29 +367,38 @@ def _gridded(
         names: Sequence[str] = ()
         if lists and isinstance(method, str):
             names = names_of(method)
+        own_lists = _of_families(lists, names)
+        entries += _with_settings(entry, own_lists)
         known.update(names)
-        applicable = _of_families(lists, names)
-        used.update(applicable)
-        entry_settings = flattened("settings", entry.get("settings", {}))
-        for name in applicable:
-            # an entry may name its settings with or without the method's name
-            if {name, name.rpartition(".")[2]} & entry_settings.keys():
-                raise InputError(
-                    "grid must contain settings that no entry of methods sets itself, "
-                    f"got {name}, which one sets"
-                )
-        if not applicable:
-            entries.append(entry)
-            continue
-        for chosen in product(*applicable.values()):
-            settings = entry_settings | dict(zip(applicable, chosen, strict=True))
-            entries.append({**entry, "settings": settings})
+        used.update(own_lists)
     for name in lists:
         if name not in used:
             raise InputError(
                 f"grid must contain settings of {', '.join(sorted(known))}, the plan's "
                 f"methods, got {quoted(name)}"
             )
+    return entries
+
+
+def _with_settings(entry: Entry, lists: Mapping[str, Any]) -> list[Entry]:
+    """Return a method's entry with every combination of the values of some settings.
+
+    Raises InputError if the entry itself sets one of them.
+    """
+    if not lists:
+        return [entry]
+    own = flattened("settings", entry.get("settings", {}))
+    for name in lists:
+        # an entry may name its settings with or without the method's name
+        if {name, name.rpartition(".")[2]} & own.keys():
+            raise InputError(
+                "grid must contain settings that no entry of methods sets itself, "
+                f"got {name}, which one sets"
+            )
+    entries = []
+    for values in product(*lists.values()):
+        settings = own | dict(zip(lists, values, strict=True))
+        entries.append({**entry, "settings": settings})
     return entries
 
 
