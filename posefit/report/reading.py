@@ -237,7 +237,7 @@ def _labels(rows: _Rows, latest: bool) -> dict[int, str]:
     variants = rows.methods.values
     score = rows.kind.score
     scores = np.array(rows.figures[score.name], dtype=np.float64)
-    badness = np.nan_to_num(-scores if score.higher_is_better else scores, nan=np.inf)
+    badness = np.nan_to_num(score.badness(scores), nan=np.inf)
     method = np.array(rows.method, dtype=np.int64)
 
     def order(m: int) -> tuple[bool, float, str]:

@@ -44,8 +44,9 @@ MAX_VALUE_BYTES = 200_000_000  # of one value that is read
 class Ledger:
     """Reads ledgers, also while drivers write to them.
 
-    It is a context manager that closes its files at the end. If several files have the
-    same cell, the first finished one counts.
+    It has the rows of the moment when it was opened. It is a context manager that
+    closes its files at the end. If several files have the same cell, the first finished
+    one counts.
 
     Args:
         paths: Ledger files, or folders of them.
