@@ -395,7 +395,7 @@ def _with_settings(entry: Entry, lists: Mapping[str, Any]) -> list[Entry]:
                 "grid must contain settings that no entry of methods sets itself, "
                 f"got {name}, which one sets"
             )
-    entries = []
+    entries: list[Entry] = []
     for values in product(*lists.values()):
         settings = own | dict(zip(lists, values, strict=True))
         entries.append({**entry, "settings": settings})
