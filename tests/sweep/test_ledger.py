@@ -519,11 +519,16 @@ def test_shards_are_one_ledger_and_a_row_in_several_files_counts_once(
             ledger.plan(chosen := cells(6))
             for cell in chosen[:count]:
                 ledger.finish(cell.key, result(cell))
-            ledger.fail(chosen[5].key, "it had to")
+            # the fourth is done in the second file, the last one in neither
+            for cell in chosen[count::2]:
+                for _ in range(ATTEMPTS):
+                    ledger.fail(cell.key, "it had to")
     for paths in ([folder], [folder / "ledger-1-of-2.sqlite", folder]):
         with Ledger(*paths) as merged:
             seeds = sorted(row["spec"]["seed"] for row in merged.rows())
             assert len(merged) == 5
+            failed = [row["key"] for row in merged.quarantined()]
+        assert failed == [chosen[5].key]
         assert seeds == [0, 1, 2, 3, 4]
 
 
