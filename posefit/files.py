@@ -106,6 +106,30 @@ def replaced_file(path: str | Path, mark: bytes) -> AbstractContextManager[Path]
     return _built(Path(path), check, _created, Path.replace)
 
 
+def replaced_folder(
+    path: str | Path, check: Callable[[Path], None], names: Sequence[str]
+) -> AbstractContextManager[Path]:
+    """Yield an empty folder to write to. On success it replaces an earlier folder.
+
+    If the body fails, the earlier folder stays.
+
+    Args:
+        path: the folder.
+        check: raises InputError if something that must not be replaced has the name.
+        names: names of the files of an earlier folder. One with anything else is not
+            replaced.
+
+    Raises:
+        InputError: something else has the name, or it cannot be written; the disk may
+            be full.
+    """
+
+    def name(building: Path, target: Path) -> None:
+        _take_place(building, target, names)
+
+    return _built(Path(path), check, _created_folder, name)
+
+
 @contextmanager
 def _built(
     target: Path,
@@ -247,24 +271,11 @@ class Unfinished:
             OSError: the earlier folder contains anything else, or a folder with the
                 target's name has appeared meanwhile.
         """
-        names = [*names, MARK]
-        aside = None
         if replace and os.path.lexists(self._target):
-            if self._target.is_symlink():
-                raise OSError(errno.ENOTDIR, "a link")
-            if others := other_entries(self._target, names):
-                raise OSError(errno.ENOTEMPTY, f"a folder with {cut(others[0])}")
-            aside = _beside(self._target)
-            self._target.rename(aside)
-        try:
+            _take_place(self.path, self._target, names)
+        else:
             self.path.rename(self._target)
-        except OSError:
-            if aside is not None:
-                aside.rename(self._target)
-            raise
         (self._target / MARK).unlink(missing_ok=True)
-        if aside is not None:
-            emptied(aside, names)
         self.close()
 
 
@@ -337,6 +348,29 @@ def _exists(target: str | Path) -> InputError:
 
 def _beside(target: Path) -> Path:
     return target.with_name(f".{target.name}.{secrets.token_hex(8)}{target.suffix}")
+
+
+def _take_place(folder: Path, target: Path, names: Iterable[str]) -> None:
+    """Give a folder the name of a target, which it replaces if that exists.
+
+    Raises OSError if the target is a link, or holds anything but files with these
+    names.
+    """
+    if not os.path.lexists(target):
+        folder.rename(target)
+        return
+    if target.is_symlink():
+        raise OSError(errno.ENOTDIR, "a link")
+    if others := other_entries(target, names):
+        raise OSError(errno.ENOTEMPTY, f"a folder with {cut(others[0])}")
+    aside = _beside(target)
+    target.rename(aside)
+    try:
+        folder.rename(target)
+    except OSError:
+        aside.rename(target)
+        raise
+    emptied(aside, [*names, MARK])
 
 
 def _created_folder(target: Path) -> Path:

@@ -136,6 +136,10 @@ class Score:
             "down": self.higher_is_better,
         }
 
+    def badness(self, value: Any) -> Any:
+        """Return a number, or an array, that is lower for better values."""
+        return -value if self.higher_is_better else value
+
     def text(self, value: float) -> str:
         """Return a value with its digits and unit."""
         return f"{value:z.{self.digits}f}{self.unit}"

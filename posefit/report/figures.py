@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from posefit.errors import InputError
-from posefit.files import Unfinished, other_entries
+from posefit.files import other_entries, replaced_folder
 from posefit.report.charts import Chart, track_charts
 from posefit.report.leaderboard import Standings
 from posefit.report.page import LIGHT
@@ -194,22 +194,11 @@ def write_figures(standings: Standings, path: str | Path) -> None:
     figures = {"leaderboard": board_figure(standings)}
     for chart in track_charts(contest):
         figures[chart.name] = chart_figure(names, chart, contest.methods, order)
-    check_folder(path)
-    try:
-        unfinished = Unfinished.begin(Path(path), {})
-        try:
-            for name, figure in figures.items():
-                for kind in ("png", "pdf"):
-                    save(figure, unfinished.path / f"{name}.{kind}")
-            write_csv(board_rows(standings), unfinished.path / TABLE)
-            unfinished.finish(FOLDER_FILES, replace=True)
-        except BaseException:
-            unfinished.remove(FOLDER_FILES)
-            raise
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot write the figures: {error.strerror or error}"
-        ) from error
+    with replaced_folder(path, check_folder, FOLDER_FILES) as building:
+        for name, figure in figures.items():
+            for kind in ("png", "pdf"):
+                save(figure, building / f"{name}.{kind}")
+        write_csv(board_rows(standings), building / TABLE)
 
 
 def _plain(name: str) -> str:

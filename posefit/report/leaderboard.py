@@ -135,9 +135,8 @@ def _best_first(contest: Contest, rows: Sequence[Standing]) -> list[Standing]:
         if value is None:
             return math.inf, 0.0
         # of searches with equal shares of targets, the lower cost is better
-        return (-value if score.higher_is_better else value), row.figures.get(
-            "above"
-        ) or 0.0
+        above = row.figures.get("above") or 0.0
+        return score.badness(value), above
 
     # the method of the best score comes first only if it lost no more than others that
     # a test does not separate from it

@@ -55,18 +55,31 @@ class _Distinct:
         return self._numbers[key]
 
 
-class _Finished:
-    """The finished rows of one kind, in the order in which they are added.
+class _Ranked(NamedTuple):
+    """Distinct numbers in an order, and for each value (n,) its place among them."""
 
-    Their values are in arrays, because objects for a million rows would fill the
-    memory.
+    numbers: list[int]
+    places: Array
+
+
+class _Rows:
+    """The rows of a ledger, all of one kind, in its order.
+
+    The values of finished rows are in arrays, because objects for a million rows would
+    fill the memory.
     """
 
     def __init__(self, kind: Kind) -> None:
-        self.instance = array("q")
-        self.method = array("q")
-        self.seed = array("q")  # its place in `seeds`
+        self.kind = kind
+        self.methods = _Distinct()  # the fields that define each method
+        self.instances = _Distinct()  # the fields that define each instance
         self.seeds: dict[int, int] = {}  # in their order, of any size
+        # each quarantined cell with the number of its method
+        self.quarantined: list[tuple[int, Row]] = []
+        # of each finished row: the numbers of its method, instance and seed
+        self.method = array("q")
+        self.instance = array("q")
+        self.seed = array("q")
         self.keys = bytearray()  # eight characters each
         self.warnings: dict[int, tuple[str, ...]] = {}  # by the row's index
         self.figures = {name: array("d") for name in kind.columns}
@@ -74,46 +87,26 @@ class _Finished:
         for name, store in kind.data.items():
             self.data[name] = store()
 
-    def add(
-        self,
-        row: Row,
-        instance: int,
-        method: int,
-        figures: Array,
-        data: dict[str, Any],
-    ) -> None:
-        """Add a row with the numbers of its instance and method.
-
-        Args:
-            row: The row.
-            instance: The number of its instance.
-            method: The number of its method.
-            figures: Its figures.
-            data: Its other data by name.
-        """
+    def add(self, row: Row) -> None:
+        """Add a row, finished or quarantined."""
+        spec = row["spec"]
+        method = self.methods.number(_variant(spec))
+        if row["status"] != "done":
+            self.quarantined.append((method, row))
+            return
+        figures, data = self.kind.read(row)
         if warnings := tuple(map(printable, row["warnings"])):
             self.warnings[len(self.method)] = warnings
         for column, figure in zip(self.figures.values(), figures.tolist(), strict=True):
             column.append(figure)
         for name, store in self.data.items():
             store.append(data[name])
-        self.instance.append(instance)
         self.method.append(method)
-        seed = int(row["spec"]["seed"])
+        self.instance.append(self.instances.number(_instance_fields(spec)))
+        seed = int(spec["seed"])
         self.seed.append(self.seeds.setdefault(seed, len(self.seeds)))
         key = row["key"].encode("ascii", "replace")
         self.keys += key[:KEY_LENGTH].ljust(KEY_LENGTH, b"\0")
-
-
-class _Rows(NamedTuple):
-    """The rows of a ledger in its order."""
-
-    kind: Kind
-    variants: list[dict[str, Any]]  # the fields that define each method
-    instances: list[dict[str, Any]]  # the fields that define each instance
-    finished: _Finished
-    # each quarantined cell with the number of its method
-    quarantined: list[tuple[int, Row]]
 
 
 def runs_of(
@@ -141,57 +134,56 @@ def runs_of(
     kind = rows.kind
     label_of = _labels(rows, latest)
     chosen = _named(methods, label_of, rows) if methods else list(label_of)
-    table = rows.finished
-    seeds = list(table.seeds)
+    variants = rows.methods.values
+    seeds = list(rows.seeds)
 
     def instance_key(number: int) -> tuple[Any, ...]:
-        fields = rows.instances[number]
+        fields = rows.instances.values[number]
         return kind.instance_order(fields), json_of(fields)
 
     # the rows of these methods, sorted by instance, method and seed
-    method_of_row = np.array(table.method, dtype=np.int64)
+    method_of_row = np.array(rows.method, dtype=np.int64)
     numbers = np.flatnonzero(np.isin(method_of_row, chosen))
-    finished, method = _ranked(method_of_row[numbers], chosen.index)
-    instance_numbers = np.array(table.instance)[numbers]
-    instance_order, instance = _ranked(instance_numbers, instance_key)
-    seed_order, seed = _ranked(np.array(table.seed)[numbers], seeds.__getitem__)
-    order = np.lexsort((seed, method, instance))
+    method = _ranked(method_of_row[numbers], chosen.index)
+    instance = _ranked(np.array(rows.instance)[numbers], instance_key)
+    seed = _ranked(np.array(rows.seed)[numbers], seeds.__getitem__)
+    order = np.lexsort((seed.places, method.places, instance.places))
     numbers = numbers[order]
 
     figures = {}
     for name in kind.columns:
         # one at a time, because two copies of all take much memory
-        figures[name] = np.array(table.figures.pop(name), dtype=np.float64)[numbers]
+        figures[name] = np.array(rows.figures.pop(name), dtype=np.float64)[numbers]
     data = {}
-    for name, store in table.data.items():
-        data[name] = Ordered[Any](store, numbers)
+    for name, store in rows.data.items():
+        data[name] = Ordered(store, numbers)
     warnings = {}
-    if table.warnings:
+    if rows.warnings:
         for k, number in enumerate(numbers.tolist()):
-            if number in table.warnings:
-                warnings[k] = table.warnings[number]
+            if number in rows.warnings:
+                warnings[k] = rows.warnings[number]
     failures = []
     for m, cell in rows.quarantined:
         if m in chosen:
             failures.append(_failure(cell, label_of[m]))
-    instance_fields = [rows.instances[number] for number in instance_order]
+    instance_fields = [rows.instances.values[number] for number in instance.numbers]
     return Runs(
         kind=kind,
         version=ledger.version,
-        methods=tuple(label_of[m] for m in finished),
-        variants=tuple(rows.variants[m] for m in finished),
+        methods=tuple(label_of[m] for m in method.numbers),
+        variants=tuple(variants[m] for m in method.numbers),
         instances=_instance_names(kind, instance_fields),
         instance_fields=tuple(instance_fields),
-        method=method[order],
-        instance=instance[order],
-        seed=seed[order],
-        seeds=tuple(seeds[k] for k in seed_order),
-        keys=np.frombuffer(table.keys, f"S{KEY_LENGTH}")[numbers],
+        method=method.places[order],
+        instance=instance.places[order],
+        seed=seed.places[order],
+        seeds=tuple(seeds[k] for k in seed.numbers),
+        keys=np.frombuffer(rows.keys, f"S{KEY_LENGTH}")[numbers],
         figures=figures,
         data=data,
         warnings=warnings,
         failures=tuple(failures),
-        chosen=frozenset(json_of(rows.variants[m]) for m in chosen),
+        chosen=frozenset(json_of(variants[m]) for m in chosen),
     )
 
 
@@ -200,23 +192,13 @@ def is_of(runs: Runs, spec: Mapping[str, Any]) -> bool:
     return json_of(_variant(spec)) in runs.chosen
 
 
-def _ranked(
-    values: "NDArray[np.int64]", key: Callable[[int], Any]
-) -> tuple[list[int], Array]:
-    """Return the distinct values in the order of a key, and each value's place there.
-
-    Args:
-        values: Whole numbers (n,).
-        key: Returns the key of a value.
-
-    Returns:
-        The distinct values, and the places (n,).
-    """
+def _ranked(values: "NDArray[np.int64]", key: Callable[[int], Any]) -> _Ranked:
+    """Return the distinct ones of some numbers (n,) in the order of a key."""
     distinct_values, number = np.unique(values, return_inverse=True)
     ordered = sorted(distinct_values.tolist(), key=key)
     rank = np.empty(len(ordered), dtype=np.int64)
     rank[np.searchsorted(distinct_values, ordered)] = np.arange(len(ordered))
-    return ordered, np.asarray(rank[number])
+    return _Ranked(ordered, np.asarray(rank[number]))
 
 
 def _read(ledger: "Ledger") -> _Rows:
@@ -225,38 +207,26 @@ def _read(ledger: "Ledger") -> _Rows:
     Raises InputError if it has no row, finished or quarantined, or has both tracks and
     searches.
     """
-    variants = _Distinct()
-    instances = _Distinct()
-    finished: _Finished | None = None
-    quarantined = list[tuple[int, Row]]()
-    kinds = set[str]()
+    rows: _Rows | None = None
     for row in ledger.all_rows():
-        spec = row["spec"]
-        kinds.add(spec["kind"])
-        if len(kinds) > 1:
+        kind = KINDS[row["spec"]["kind"]]
+        if rows is None:
+            rows = _Rows(kind)
+        if kind is not rows.kind:
             raise InputError(
                 f"{ledger.path}: expected a ledger of either tracks or single "
                 "searches, got both"
             )
-        kind = KINDS[spec["kind"]]
-        if finished is None:
-            finished = _Finished(kind)
         try:
-            method = variants.number(_variant(spec))
-            if row["status"] != "done":
-                quarantined.append((method, row))
-                continue
-            figures, data = kind.read(row)
-            instance = instances.number(_instance_fields(spec))
-            finished.add(row, instance, method, figures, data)
+            rows.add(row)
         # raised if a value is missing or has another type
         except (ValueError, TypeError, LookupError, AttributeError) as error:
             raise ledger.damaged_row(row["key"], error) from None
-    if finished is None:
+    if rows is None:
         raise InputError(
             f"{ledger.path}: expected a ledger with finished rows, got none"
         )
-    return _Rows(kind, variants.values, instances.values, finished, quarantined)
+    return rows
 
 
 def _labels(rows: _Rows, latest: bool) -> dict[int, str]:
@@ -264,11 +234,11 @@ def _labels(rows: _Rows, latest: bool) -> dict[int, str]:
 
     Methods that only failed are last.
     """
-    variants = rows.variants
+    variants = rows.methods.values
     score = rows.kind.score
-    scores = np.array(rows.finished.figures[score.name], dtype=np.float64)
-    badness = np.nan_to_num(-scores if score.higher_is_better else scores, nan=np.inf)
-    method = np.array(rows.finished.method, dtype=np.int64)
+    scores = np.array(rows.figures[score.name], dtype=np.float64)
+    badness = np.nan_to_num(score.badness(scores), nan=np.inf)
+    method = np.array(rows.method, dtype=np.int64)
 
     def order(m: int) -> tuple[bool, float, str]:
         """Return a key that is lower for better methods."""
@@ -318,7 +288,7 @@ def _named(names: Sequence[str], label_of: Mapping[int, str], rows: _Rows) -> li
     """
     names_of = {}
     for m, label in label_of.items():
-        names_of[m] = {label, _planned_name(rows.variants[m])}
+        names_of[m] = {label, _planned_name(rows.methods.values[m])}
     known = set().union(*names_of.values())
     for name in names:
         if name not in known:

@@ -49,6 +49,12 @@ def _hits(run: SuiteRun) -> Array:
     return hits((run.evaluations, run.costs), run.targets)
 
 
+def _figures(run: SuiteRun, hits_of_run: Array) -> dict[str, float]:
+    """Return the share of targets that a run reached, and its cost above the truth."""
+    reached = 100.0 * float(np.isfinite(hits_of_run).mean())
+    return {"reached": reached, "above": run.cost - run.truth_cost}
+
+
 _REACHED = Measure(
     "reached", "targets", "%", 1, "Share of all runs and targets that were reached"
 )
@@ -90,14 +96,14 @@ class Searches:
     def computed(self, row: Row, /) -> dict[str, float]:
         """Return the share of targets that a row reached, and its cost above."""
         run = search_run(row)
-        reached = 100.0 * float(np.isfinite(_hits(run)).mean())
-        return {"reached": reached, "above": run.cost - run.truth_cost}
+        return _figures(run, _hits(run))
 
     def read(self, row: Row, /) -> tuple[Array, dict[str, Any]]:
         """Return the figures of a row, its run, and its evaluations to each target."""
         run = search_run(row)
-        figures = np.array(list(self.computed(row).values()))
-        return figures, {"runs": run, "hits": _hits(run)}
+        hits_of_run = _hits(run)
+        figures = np.array([*_figures(run, hits_of_run).values()])
+        return figures, {"runs": run, "hits": hits_of_run}
 
     def instance_order(self, fields: InstanceFields) -> tuple[Any, ...]:
         """Return the key by which instances are sorted."""
@@ -214,18 +220,11 @@ def search_charts(contest: Contest) -> list[Chart]:
     would give.
     """
     functions = contest.instance_field("function")
-    dimensions = contest.instance_field("dimension")
     instances = contest.instance_field("instance")
     runs = contest.data("runs", contest.blocks)
     most = max(float(run.evaluations[-1]) / run.dimension for run in runs)
     evaluations = np.unique(np.geomspace(1.0, max(most, 1.0), POINTS))
-    hits_of_runs = np.array(contest.data("hits", contest.blocks))
-    hits_of_runs = hits_of_runs.reshape(*contest.blocks.shape, -1)
-    hits_of_runs = hits_of_runs / dimensions.astype(np.float64)[None, :, None]
-    # (methods, blocks, points)
-    shares = np.array(
-        [[attained(times, evaluations) for times in rows] for rows in hits_of_runs]
-    )
+    shares = _shares(contest, evaluations)
     numbers = np.unique(functions).tolist()
     parts = {"All functions": np.ones(len(functions), dtype=bool)}
     if len(numbers) > 1:
@@ -246,13 +245,21 @@ def search_charts(contest: Contest) -> list[Chart]:
         )
         charts.append(chart)
     # one scale for all charts, so that functions can be compared
-    ends = []
-    for chart in charts:
-        for line in chart.lines:
-            if line:
-                ends.append(float(line.y[-1]))
+    ends = [float(line.y[-1]) for chart in charts for line in chart.lines if line]
     end = min(1.0, 1.1 * max(0.05, *ends))
     return [replace(chart, most=end) for chart in charts]
+
+
+def _shares(contest: Contest, evaluations: Array) -> Array:
+    """Return the share of targets that each run reached (methods, blocks, points).
+
+    There is one for each number of evaluations (points,) for each dimension.
+    """
+    dimensions = contest.instance_field("dimension").astype(np.float64)
+    times = np.array(contest.data("hits", contest.blocks))
+    times = times.reshape(*contest.blocks.shape, -1)  # (methods, blocks, targets)
+    times = times / dimensions[:, None]
+    return np.array([[attained(run, evaluations) for run in rows] for rows in times])
 
 
 def running_times(contest: Contest) -> list[dict[str, Any]]:

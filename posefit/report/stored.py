@@ -2,15 +2,13 @@
 
 from array import array
 from collections.abc import Sequence
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.statistics.profiles import Trace
-
-Item = TypeVar("Item")
 
 
 class Stored(Protocol):
@@ -75,7 +73,7 @@ class Traces:
         return len(self._used)
 
 
-class Ordered(Sequence[Item], Generic[Item]):
+class Ordered(Sequence[Any]):
     """Some values of a store in another order, which are not copied."""
 
     def __init__(self, store: Stored, order: NDArray[np.int64]) -> None:
@@ -88,9 +86,7 @@ class Ordered(Sequence[Item], Generic[Item]):
         self._store = store
         self._order = order
 
-    def __getitem__(self, k):  # type: ignore[no-untyped-def]
-        if isinstance(k, slice):
-            return Ordered(self._store, self._order[k])
+    def __getitem__(self, k: Any) -> Any:
         return self._store[int(self._order[k])]
 
     def __len__(self) -> int:

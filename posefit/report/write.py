@@ -1,6 +1,6 @@
 """The command `posefit report`: a page, and on request figures, a CSV and a table."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,6 +21,8 @@ from posefit.sweep.table import flat, write_csv
 
 PRINTED = ("header", "answer", "leaderboard", "baselines", "times")
 CSV_MARK = "key,version,status,"  # how the CSV of a sweep begins
+# how the files of an earlier report begin, which may be replaced
+MARKS = {"--out": MARK, "--csv": CSV_MARK, "--latex": LATEX_MARK}
 
 
 class Report(NamedTuple):
@@ -28,16 +30,6 @@ class Report(NamedTuple):
 
     lines: list[str]
     data: dict[str, Any]
-
-
-class _Outputs(NamedTuple):
-    """The paths of what `write_report` writes, None for what is not wanted."""
-
-    out: str | None
-    figures: str | None
-    csv: str | None
-    latex: str | None
-    coco: str | None
 
 
 def write_report(
@@ -77,7 +69,14 @@ def write_report(
         ImportError: Figures are asked for, and matplotlib is not installed.
     """
     paths = [path] if isinstance(path, str | Path) else path
-    outputs = _Outputs(out, figures, csv, latex, coco)
+    options = {
+        "--out": out,
+        "--figures": figures,
+        "--csv": csv,
+        "--latex": latex,
+        "--coco": coco,
+    }
+    outputs = {option: to for option, to in options.items() if to is not None}
     _check_paths(paths, outputs)
     with Ledger(*paths) as ledger:
         runs = runs_of(ledger, methods, latest=latest)
@@ -104,41 +103,46 @@ def write_report(
     return Report(lines, {"out": out, "kind": runs.kind.name, **dict(printed)})
 
 
-def _check_paths(ledgers: Sequence[str | Path], outputs: _Outputs) -> None:
+def _check_paths(ledgers: Sequence[str | Path], outputs: Mapping[str, str]) -> None:
     """Raise an error if an output cannot be written where it is to be.
 
     What the ledger contains does not matter here, so this comes before it is read.
+
+    Args:
+        ledgers: The ledgers that are read.
+        outputs: The path of each output by its option.
     """
-    out = outputs.out
+    out = outputs.get("--out")
     if out is not None and Path(out).suffix.lower() not in (".html", ".htm"):
         raise InputError(f"--out must be a file that ends in .html, got {cut(out)}")
-    marks = ((out, MARK), (outputs.csv, CSV_MARK), (outputs.latex, LATEX_MARK))
-    for file, mark in marks:
-        if file is not None:
-            check_replaceable(file, mark.encode())
-    _check_distinct(ledgers, outputs)
-    if outputs.coco is not None:
-        check_new(outputs.coco)
-    if outputs.figures is not None:
+    for option, mark in MARKS.items():
+        if option in outputs:
+            check_replaceable(outputs[option], mark.encode())
+    _check_distinct(ledgers, outputs.values())
+    if "--coco" in outputs:
+        check_new(outputs["--coco"])
+    if "--figures" in outputs:
         from posefit.report.figures import check_folder, empty_figure
 
-        check_folder(outputs.figures)
+        check_folder(outputs["--figures"])
         empty_figure()  # raises if matplotlib is missing
 
 
-def _check_runs(runs: Runs, standings: Standings | None, outputs: _Outputs) -> None:
-    """Raise InputError if an output cannot be made of these runs."""
-    if runs.kind.name == "search" and outputs.figures is not None:
+def _check_runs(
+    runs: Runs, standings: Standings | None, options: Collection[str]
+) -> None:
+    """Raise InputError if the output of an option cannot be made of these runs."""
+    is_search = runs.kind.name == "search"
+    if is_search and "--figures" in options:
         raise InputError(
             "--figures must be given with a sweep of tracks, got one of single searches"
         )
-    if runs.kind.name != "search" and outputs.coco is not None:
+    if not is_search and "--coco" in options:
         raise InputError(
             "--coco must be given with a sweep of single searches, got one of tracks"
         )
-    compared = (("--figures", outputs.figures), ("--latex", outputs.latex))
-    for option, path in compared:
-        if path is not None and standings is None:
+    for option in ("--figures", "--latex"):
+        if option in options and standings is None:
             raise InputError(
                 f"{option} needs runs whose error is known, got a sweep without any"
             )
@@ -180,10 +184,9 @@ def _csv_rows(ledger: Ledger, runs: Runs) -> Iterator[dict[str, Any]]:
         yield {**columns, "command": repeat_command(row["spec"])}
 
 
-def _check_distinct(ledgers: Sequence[str | Path], outputs: _Outputs) -> None:
+def _check_distinct(ledgers: Iterable[str | Path], paths: Collection[str]) -> None:
     """Raise InputError if a path is used twice, or its folder does not exist."""
     used = {Path(ledger).resolve() for ledger in ledgers}
-    paths = [path for path in outputs if path is not None]
     for path in paths:
         resolved = Path(path).resolve()
         if resolved in used:

@@ -6,7 +6,7 @@ other fields are checked here.
 
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from functools import lru_cache
 from math import inf
@@ -180,13 +180,20 @@ def _checked(
     for name in required:
         if name not in spec:
             raise InputError(f"a cell must have a {name}, got none")
-    for name in spec:
-        if name not in checks:
-            raise InputError(
-                f"a key of a cell must be one of {', '.join(checks)}, "
-                f"got {quoted(name)}{suggestion(name, checks)}"
-            )
+    check_names("a cell", spec, checks)
     return {name: checks[name](name, value) for name, value in spec.items()}
+
+
+def check_names(
+    what: str, table: Mapping[str, Any], known: Sequence[str] | Mapping[str, Any]
+) -> None:
+    """Raise InputError if a table has an unknown name."""
+    for name in table:
+        if name not in known:
+            raise InputError(
+                f"a key of {what} must be one of {', '.join(known)}, "
+                f"got {quoted(name)}{suggestion(name, known)}"
+            )
 
 
 def families(method: str) -> tuple[str, ...]:
@@ -353,13 +360,7 @@ def _corruption(field: str, value: Any) -> dict[str, float]:
             f"{field} must be a table of strengths such as {{holes = 0.3}}, "
             f"got {quoted(value)}"
         )
-    kinds = (*CORRUPTIONS, DROPPED)
-    for kind in value:
-        if kind not in kinds:
-            raise InputError(
-                f"{field} must be of {', '.join(kinds)}, "
-                f"got {quoted(kind)}{suggestion(kind, kinds)}"
-            )
+    check_names(field, value, (*CORRUPTIONS, DROPPED))
     check = within(0.0, 1.0)
     strengths = {}
     for kind in sorted(value):

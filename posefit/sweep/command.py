@@ -2,7 +2,7 @@
 
 import os
 import shlex
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import closing
 from pathlib import Path
 
@@ -56,31 +56,20 @@ def swept(
     compile_kernels()
     file, *others = ledgers_of(out, shard)
     with closing(engine), Writer(file) as ledger:
-        for version, count in ledger.versions().items():
-            if any(map(other_version, version.split(", "))):
-                rows = counted(count, "row")
-                say(f"{out}: {rows} of another version do not count: {cut(version)}")
+        _say_other_versions(ledger, out, say)
         ledger.plan(cells_of(plan, shard), done_in(others))
         if retry_quarantined:
             count = ledger.release_quarantined()
             cells = "cell is" if count == 1 else "cells are"
             say(f"{count} quarantined {cells} tried again")
         counts = ledger.counts()
-        total = counts.total()
-        if counts["done"]:
-            say(f"{counts['done']} of {total} cells are done already")
-        if counts["quarantined"]:
-            say(
-                f"{counted(counts['quarantined'], 'cell')} in quarantine: "
-                "--retry-quarantined tries again"
-            )
-        hidden = quiet or not bars_shown()
+        _say_ended(counts, say)
         with tqdm(
-            total=total,
+            total=counts.total(),
             initial=counts["done"] + counts["quarantined"],
             unit="cell",
             dynamic_ncols=True,
-            disable=hidden,
+            disable=quiet or not bars_shown(),
         ) as bar:
 
             def watch(tally: Tally) -> None:
@@ -97,6 +86,28 @@ def swept(
                 say(message)
 
             return drive(ledger, engine, say_beside_bar, watch)
+
+
+def _say_other_versions(
+    ledger: Writer, out: str | Path, say: Callable[[str], None]
+) -> None:
+    """Say which rows of a ledger do not count, because another version made them."""
+    for version, count in ledger.versions().items():
+        if any(map(other_version, version.split(", "))):
+            rows = counted(count, "row")
+            say(f"{out}: {rows} of another version do not count: {cut(version)}")
+
+
+def _say_ended(counts: Mapping[str, int], say: Callable[[str], None]) -> None:
+    """Say how many cells of a plan are done or quarantined before a sweep begins."""
+    if counts["done"]:
+        total = sum(counts.values())
+        say(f"{counts['done']} of {total} cells are done already")
+    if counts["quarantined"]:
+        say(
+            f"{counted(counts['quarantined'], 'cell')} in quarantine: "
+            "--retry-quarantined tries again"
+        )
 
 
 def engine_starter(

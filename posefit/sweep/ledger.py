@@ -20,12 +20,8 @@ The view `runs` has columns for the values that queries use most (schema.py).
 
 import json
 import os
-import re
-import shlex
 import sqlite3
-from array import array
-from bisect import bisect_left
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -43,17 +39,14 @@ if TYPE_CHECKING:
 
 OPEN_SECONDS = 5.0  # the longest wait for a program that locks a file
 MAX_VALUE_BYTES = 200_000_000  # of one value that is read
-KEY = re.compile("[0-9a-f]{64}")  # of a cell
-# of rows. The order decides which of several rows of a cell counts: a finished one.
-STATUSES = ("done", "quarantined")
-WITH_STATUS = "FROM cells WHERE status = ? ORDER BY rowid"  # the end of most queries
 
 
 class Ledger:
     """Reads ledgers, also while drivers write to them.
 
-    It is a context manager that closes its files at the end. If several files have the
-    same cell, the first finished one counts.
+    It has the rows of the moment when it was opened. It is a context manager that
+    closes its files at the end. If several files have the same cell, the first finished
+    one counts.
 
     Args:
         paths: Ledger files, or folders of them.
@@ -79,28 +72,12 @@ class Ledger:
         names: dict[Path, None] = {}
         for path in paths:
             names.update(dict.fromkeys(_names(Path(path))))
-        self._files: list[_File] = []
+        self._files: dict[Path, sqlite3.Connection] = {}
         with ExitStack() as opened:
             opened.callback(self.close)
             for name in names:
-                self._files.append(_File(name))
-            self._choose_cells()
+                self._files[name] = _reader(name)
             opened.pop_all()
-
-    def _choose_cells(self) -> None:
-        """Fill `counted` of each file with the cells that count."""
-        # the keys of one file differ, so it needs no set of perhaps a million
-        several = len(self._files) > 1
-        earlier = set[str]()
-        query = f"SELECT rowid, key {WITH_STATUS}"
-        for status in STATUSES:
-            for file in self._files:
-                for rowid, key in file.query(query, status):
-                    if several and key in earlier:
-                        continue
-                    if several:
-                        earlier.add(key)
-                    file.counted[status].append(rowid)
 
     def __enter__(self) -> Self:
         return self
@@ -109,24 +86,19 @@ class Ledger:
         self.close()
 
     def __len__(self) -> int:
-        return sum(len(file.counted["done"]) for file in self._files)
+        return sum(1 for _ in self._cells("key", "done"))
 
     def done(self) -> set[str]:
         """Return the keys of the finished cells."""
-        done = set[str]()
-        for file in self._files:
-            for (key,) in file.cells("key", "done"):
-                done.add(key)
-        return done
+        return {key for key, _ in self._cells("key", "done")}
 
     @property
     def changed(self) -> float:
         """The time of the latest change to any of its files, in seconds since 1970."""
-        files = [file.path for file in self._files]
-        logs = [Path(f"{file}{WAL}") for file in files]
+        logs = [Path(f"{file}{WAL}") for file in self._files]
         # a reader makes a log as well, which stays empty
         written = [log for log in logs if log.exists() and log.stat().st_size]
-        return max(path.stat().st_mtime for path in (*files, *written))
+        return max(path.stat().st_mtime for path in (*self._files, *written))
 
     @property
     def version(self) -> str:
@@ -136,7 +108,7 @@ class Ledger:
         """
         builds = set()
         for file in self._files:
-            for version, _ in file.query(VERSIONS):
+            for version, _ in self._query(file, VERSIONS):
                 # the versions of plugins follow after commas
                 builds.add(str(version).partition(", ")[0])
         if not builds:
@@ -167,84 +139,48 @@ class Ledger:
 
     def close(self) -> None:
         """Close its files."""
-        for file in self._files:
-            file.close()
+        for database in self._files.values():
+            database.close()
 
     def damaged_row(self, key: str, error: Exception) -> InputError:
-        """Return the error of a row that was changed since posefit wrote it.
-
-        Its message has a command that plans the cell again, if the key is posefit's.
-        """
+        """Return the error of a row that was changed since posefit wrote it."""
         name = quoted(key[:8])[1:-1]
-        having = [file.path for file in self._files if file.counts(key)]
-        path, *_ = having or [self._files[0].path]
-        reason = cut(text_of(error))
-        # a key of somebody else's ledger could contain a command of the shell
-        if not KEY.fullmatch(key):
-            return InputError(
-                f"{path}: the row and the key of cell {name} must be written by "
-                f"posefit: {reason}"
-            )
-        statement = f"UPDATE cells SET status = 'planned' WHERE key LIKE '{name}%'"
         return InputError(
-            f"{path}: the row of cell {name} must be written by posefit: {reason}; "
-            f'to run it again: sqlite3 {shlex.quote(str(path))} "{statement}"'
+            f"{self.path}: the row of cell {name} must be written by posefit: "
+            f"{cut(text_of(error))}; use a backup, or delete the row"
         )
 
     def _rows(self, status: str) -> Iterator[dict[str, Any]]:
+        for key, texts in self._cells("key, spec, faults, row", status):
+            try:
+                yield _parsed_row(key, status, *texts)
+            except (ValueError, TypeError, KeyError, RecursionError) as error:
+                raise self.damaged_row(str(key), error) from None
+
+    def _cells(self, columns: str, status: str) -> Iterator[tuple[Any, list[Any]]]:
+        """Yield the key and other columns of each cell that has this status.
+
+        A cell counts once, and as finished if it is finished in any of the files.
+        """
+        # the keys of one file differ, so it needs no set of perhaps a million
+        several = len(self._files) > 1
+        counted = set[str]()
+        if several and status != "done":
+            counted = self.done()
+        query = f"SELECT {columns} FROM cells WHERE status = ? ORDER BY rowid"
         for file in self._files:
-            for key, *texts in file.cells("key, spec, faults, row", status):
-                try:
-                    yield _parsed_row(key, status, *texts)
-                except (ValueError, TypeError, KeyError, RecursionError) as error:
-                    raise self.damaged_row(str(key), error) from None
+            for key, *values in self._query(file, query, status):
+                if key not in counted:
+                    yield key, values
+                if several:
+                    counted.add(key)
 
-
-class _File:
-    """A file of a ledger, open for reading.
-
-    Attributes:
-        path: The file.
-        counted: By status, the rowids of the cells that count, rising. Keys of a
-            million cells would take much memory.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.counted = {status: array("q") for status in STATUSES}
-        self._database = _reader(path)
-
-    def close(self) -> None:
-        self._database.close()
-
-    def query(self, query: str, *values: Any) -> Iterator[Any]:
+    def _query(self, file: Path, query: str, *values: Any) -> Iterator[Any]:
         """Yield the rows of a query. Raises InputError if the file cannot be read."""
         try:
-            yield from self._database.execute(query, values)
+            yield from self._files[file].execute(query, values)
         except (sqlite3.Error, UnicodeDecodeError) as error:
-            raise unusable(self.path, error) from None
-
-    def cells(self, columns: str, status: str) -> Iterator[Any]:
-        """Yield columns of the cells that count."""
-        query = f"SELECT rowid, {columns} {WITH_STATUS}"
-        for rowid, *values in self.query(query, status):
-            # a driver may have finished others since the ledger was opened
-            if _is_in(rowid, self.counted[status]):
-                yield values
-
-    def counts(self, key: str) -> bool:
-        """Return whether the cell with this key is among those that count."""
-        query = "SELECT rowid, status FROM cells WHERE key = ?"
-        for rowid, status in self.query(query, key):
-            if _is_in(rowid, self.counted.get(status, [])):
-                return True
-        return False
-
-
-def _is_in(rowid: int, rising: Sequence[int]) -> bool:
-    """Return whether a rowid is among others, in ascending order."""
-    place = bisect_left(rising, rowid)
-    return place < len(rising) and rising[place] == rowid
+            raise unusable(file, error) from None
 
 
 def _parsed_row(
@@ -287,9 +223,15 @@ def _reader(file: Path) -> sqlite3.Connection:
     with ExitStack() as opened:
         try:
             database = opened.enter_context(
-                closing(sqlite3.connect(address, uri=True, timeout=OPEN_SECONDS))
+                closing(
+                    sqlite3.connect(
+                        address, uri=True, timeout=OPEN_SECONDS, isolation_level=None
+                    )
+                )
             )
             database.execute("PRAGMA query_only = ON")
+            # all queries see the rows of one moment, whatever a driver adds meanwhile
+            database.execute("BEGIN")
             database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MAX_VALUE_BYTES)
             if not format_of(file, database):
                 raise InputError(

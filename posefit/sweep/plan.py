@@ -18,13 +18,14 @@ from typing import Any, Self
 
 from posefit.errors import InputError
 from posefit.motion.instances import HELD_OUT
-from posefit.reading import SHOWN, cut, parsed_toml, quoted, read_text, suggestion
+from posefit.reading import SHOWN, cut, parsed_toml, quoted, read_text
 from posefit.suites.functions import FUNCTIONS, suite_function
 from posefit.suites.problem import EVALUATIONS
 from posefit.sweep.cell import Cell
 from posefit.sweep.check import (
     FIELDS,
     cell_of,
+    check_names,
     clear_caches,
     families,
     flattened,
@@ -160,9 +161,9 @@ def plan_text(path: str | Path) -> str:
 
 def _tracks(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
     """Return a function that makes the cells of a plan of tracks."""
-    _check_names("a plan", tables, TABLES)
+    check_names("a plan", tables, TABLES)
     defaults = _mapping("defaults", tables.get("defaults", {}))
-    _check_names("defaults", defaults, FIELDS)
+    check_names("defaults", defaults, FIELDS)
     shared = flattened("defaults.settings", defaults.get("settings", {}))
     listed = tables.get("cells", [])
     if not isinstance(listed, list | tuple):
@@ -198,7 +199,7 @@ def _track_lists(tables: Mapping[str, Any]) -> dict[str, Sequence[Any]]:
     the cases that are done.
     """
     crossed = _mapping("product", tables.get("product") or {})
-    _check_names("product", crossed, [*LISTS, *PARTS])
+    check_names("product", crossed, [*LISTS, *PARTS])
     if any(part in crossed for part in PARTS):
         crossed = _with_methods(crossed)
     lists: dict[str, Sequence[Any]] = {}
@@ -238,7 +239,7 @@ def _with_methods(crossed: Mapping[str, Any]) -> dict[str, Any]:
         entries = _listed(f"product.{plural}", singular, crossed[plural])
         tables = [_fields(singular, entry) for entry in entries]
         for table in tables:
-            _check_names(f"an entry of {plural}", table, (singular, "settings"))
+            check_names(f"an entry of {plural}", table, (singular, "settings"))
             if not isinstance(table.get(singular), str):
                 raise InputError(
                     f"an entry of {plural} must be a name, or a table with {singular}, "
@@ -266,7 +267,7 @@ def _searches(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
     A function has no cells in dimensions in which it does not exist. Raises InputError
     if that leaves a function that the plan names without any.
     """
-    _check_names(
+    check_names(
         "a plan of a suite", tables, ("suite", *SEARCH_LISTS, "infeasible", "grid")
     )
     shared = {name: tables[name] for name in ("suite", "infeasible") if name in tables}
@@ -366,29 +367,38 @@ def _gridded(
         names: Sequence[str] = ()
         if lists and isinstance(method, str):
             names = names_of(method)
+        own_lists = _of_families(lists, names)
+        entries += _with_settings(entry, own_lists)
         known.update(names)
-        applicable = _of_families(lists, names)
-        used.update(applicable)
-        entry_settings = flattened("settings", entry.get("settings", {}))
-        for name in applicable:
-            # an entry may name its settings with or without the method's name
-            if {name, name.rpartition(".")[2]} & entry_settings.keys():
-                raise InputError(
-                    "grid must contain settings that no entry of methods sets itself, "
-                    f"got {name}, which one sets"
-                )
-        if not applicable:
-            entries.append(entry)
-            continue
-        for chosen in product(*applicable.values()):
-            settings = entry_settings | dict(zip(applicable, chosen, strict=True))
-            entries.append({**entry, "settings": settings})
+        used.update(own_lists)
     for name in lists:
         if name not in used:
             raise InputError(
                 f"grid must contain settings of {', '.join(sorted(known))}, the plan's "
                 f"methods, got {quoted(name)}"
             )
+    return entries
+
+
+def _with_settings(entry: Entry, lists: Mapping[str, Any]) -> list[Entry]:
+    """Return a method's entry with every combination of the values of some settings.
+
+    Raises InputError if the entry itself sets one of them.
+    """
+    if not lists:
+        return [entry]
+    own = flattened("settings", entry.get("settings", {}))
+    for name in lists:
+        # an entry may name its settings with or without the method's name
+        if {name, name.rpartition(".")[2]} & own.keys():
+            raise InputError(
+                "grid must contain settings that no entry of methods sets itself, "
+                f"got {name}, which one sets"
+            )
+    entries: list[Entry] = []
+    for values in product(*lists.values()):
+        settings = own | dict(zip(lists, values, strict=True))
+        entries.append({**entry, "settings": settings})
     return entries
 
 
@@ -401,18 +411,6 @@ def _grid_lists(grid: Any) -> dict[str, Any]:
         if "." not in name or not isinstance(values, list | tuple) or not values:
             raise InputError(f"grid must contain {GRID}, got {name} = {quoted(values)}")
     return lists
-
-
-def _check_names(
-    what: str, table: Mapping[str, Any], known: Sequence[str] | Mapping[str, str]
-) -> None:
-    """Raise InputError if a table has an unknown name."""
-    for name in table:
-        if name not in known:
-            raise InputError(
-                f"a key of {what} must be one of {', '.join(known)}, "
-                f"got {quoted(name)}{suggestion(name, known)}"
-            )
 
 
 def _check_fields(lists: Mapping[str, Sequence[Any]]) -> None:

@@ -93,7 +93,8 @@ def _cells(
     file_of(shard)
     cells = cells_of(Plan.read(plan), shard)
     done = done_in(ledgers)
-    yield from ((cell, cell.key in done) for cell in cells)
+    for cell in cells:
+        yield cell, cell.key in done
 
 
 def _value_lines(counts: Mapping[str, Counter[str]]) -> list[str]:
