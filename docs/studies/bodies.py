@@ -235,8 +235,9 @@ class Shot(NamedTuple):
 def shots_with_legs() -> list[Shot]:
     """Return the films of people with legs of published shapes.
 
-    Those who stand upright are filmed by one camera, with landmarks, which show whether
-    they face it; the others are filmed by one, two and four.
+    Those who stand upright, each in two bodies, are filmed by one camera, with
+    landmarks, which show whether they face it; the others are filmed by one, two and
+    four.
     """
     several = [
         Shot(situation, number, views, body, legs=True)
@@ -244,8 +245,9 @@ def shots_with_legs() -> list[Shot]:
         for body, (situation, number) in enumerate(WITH_LEGS)
     ]
     upright = [
-        Shot("upright", body, 1, body, landmarks=True, legs=True)
-        for body in range(len(UPRIGHT))
+        Shot("upright", number, 1, (number + off) % BODIES, landmarks=True, legs=True)
+        for off in (0, BODIES // 2)
+        for number in range(len(UPRIGHT))
     ]
     return [*several, *upright]
 
