@@ -7,7 +7,7 @@
 | `cheapest` | the frames of the cheapest hypothesis | trajectory.py |
 | `retrack_spins` | frames tracked again if the body spins | restarts.py |
 | `smooth` | footage: a smooth path, planted feet, fitted contours | smoothing/ |
-| `with_straight_legs` | one camera: straighter legs of people who stand | smoothing/standing.py |
+| `with_straight_legs` | one camera: straighter legs | smoothing/standing.py |
 | `with_cheapest_legs` | one camera: some frames' legs exchanged | smoothing/legs.py |
 | `tracked_again` | several cameras: back, then onward | restarts.py |
 | `evaluate` | errors against the truth, or signs of trust | evaluate.py |
