@@ -22,7 +22,8 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
+from unittest.mock import patch
 
 import click
 import cv2
@@ -49,6 +50,8 @@ from flesh import LENGTHS as PUBLISHED
 from flesh import Legs, legs_of, painted
 from posefit import clinical_angles
 from posefit.arrays import Array
+from posefit.evaluation import trust
+from posefit.evaluation.trust import Grade
 from posefit.fitting import metrics
 from posefit.fitting.landmarks import GROUPS
 from posefit.fitting.landmarks import MIRRORED as OTHER_SIDE
@@ -145,6 +148,10 @@ LEGS = [
 # largest MPJPE of a right track, and smallest of a wrong one
 RIGHT_MM = 65.0
 WRONG_MM = 75.0
+# Signs whose limits are chosen on half of the bodies, and the factors that are tried.
+CHOSEN = ("training_mm", "frontal", "acceleration", "unknown", "lost")
+FACTORS = (0.7, 1.0, 1.4, 2.0)
+WRONG_GOOD = 0.02  # share of the wrong tracks that may be good
 # turn of one thigh; share by which a cycle runs faster and slower
 LIMP_DEGREES = 7.0
 LIMP_WARP = 0.15
@@ -235,8 +242,9 @@ class Shot(NamedTuple):
 def shots_with_legs() -> list[Shot]:
     """Return the films of people with legs of published shapes.
 
-    Those who stand upright are filmed by one camera, with landmarks, which show whether
-    they face it; the others are filmed by one, two and four.
+    Those who stand upright, each in two bodies, are filmed by one camera, with
+    landmarks, which show whether they face it; the others are filmed by one, two and
+    four.
     """
     several = [
         Shot(situation, number, views, body, legs=True)
@@ -244,8 +252,9 @@ def shots_with_legs() -> list[Shot]:
         for body, (situation, number) in enumerate(WITH_LEGS)
     ]
     upright = [
-        Shot("upright", body, 1, body, landmarks=True, legs=True)
-        for body in range(len(UPRIGHT))
+        Shot("upright", number, 1, (number + off) % BODIES, landmarks=True, legs=True)
+        for off in (0, BODIES // 2)
+        for number in range(len(UPRIGHT))
     ]
     return [*several, *upright]
 
@@ -795,19 +804,118 @@ def accuracy_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     yield from markdown(heads, cells, 1)
 
 
-def verdict_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield how many right and wrong tracks have the grade good.
+class Limits(NamedTuple):
+    """From where on signs make a track doubtful, and how many make it unusable."""
 
-    There is a row for each number of cameras, and for odd and even bodies.
+    doubtful: Mapping[str, float]
+    together: int
+
+    def grade(self, figures: Mapping[str, Any]) -> Grade:
+        """Return the grade of a track by the figures of its signs."""
+        signs = {}
+        for name, doubtful in self.doubtful.items():
+            best, _, unusable = trust.SIGNS[name].limits or (0.0, 0.0, 0.0)
+            limits = (best, doubtful, max(unusable, 1.01 * doubtful))
+            signs[name] = replace(trust.SIGNS[name], limits=limits)
+        with (
+            patch.dict(trust.SIGNS, signs),
+            patch.object(trust, "UNUSABLE_TOGETHER", self.together),
+        ):
+            return trust.grade_of(trust.signs_against(figures))
+
+
+class Verdicts(NamedTuple):
+    """The grades of right and of wrong tracks."""
+
+    right: Sequence[Grade]
+    wrong: Sequence[Grade]
+
+    @classmethod
+    def of(cls, rows: Sequence[Mapping[str, Any]], limits: Limits) -> Self:
+        """Return the grades of tracks that are right or wrong, by some limits."""
+        right = []
+        wrong = []
+        for row in rows:
+            if row["mpjpe_mm"] <= RIGHT_MM:
+                right.append(limits.grade(row["trust"]))
+            elif row["mpjpe_mm"] >= WRONG_MM:
+                wrong.append(limits.grade(row["trust"]))
+        return cls(right, wrong)
+
+    @property
+    def value(self) -> tuple[int, int]:
+        """How good the limits are: right tracks are good, and only wrong ones unused.
+
+        Limits with which more than `WRONG_GOOD` of the wrong tracks are good come last.
+        """
+        if self.wrong.count("good") > WRONG_GOOD * len(self.wrong):
+            return -1, 0
+        unused = self.wrong.count("do not use") - self.right.count("do not use")
+        return self.right.count("good"), unused
+
+    @property
+    def cells(self) -> list[str]:
+        """The cells of a row of a table."""
+        cells = []
+        for grade in ("good", "do not use"):
+            for grades in (self.right, self.wrong):
+                cells.append(f"{grades.count(grade)} of {len(grades)}")
+        return cells
+
+
+def present_limits() -> Limits:
+    """Return the limits of `posefit.evaluation.trust`."""
+    doubtful = {}
+    for name in CHOSEN:
+        limits = trust.SIGNS[name].limits
+        assert limits is not None
+        doubtful[name] = limits[1]
+    return Limits(doubtful, trust.UNUSABLE_TOGETHER)
+
+
+def chosen_limits(rows: Sequence[Mapping[str, Any]]) -> Limits:
+    """Return the best limits for some tracks; of equally good ones, the present ones.
+
+    Of others that are equally good, it is those nearest to the present ones.
     """
+    present = present_limits()
+    tried = []
+    for factors in product(FACTORS, repeat=len(CHOSEN)):
+        pairs = zip(present.doubtful.items(), factors, strict=True)
+        doubtful = {name: limit * factor for (name, limit), factor in pairs}
+        far = float(np.abs(np.log(factors)).sum())
+        for together in (present.together, present.together - 1):
+            limits = Limits(doubtful, together)
+            away = far + abs(together - present.together)
+            tried.append((Verdicts.of(rows, limits).value, -away, limits))
+    return max(tried, key=lambda value_away_limits: value_away_limits[:2])[2]
+
+
+def verdict_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Yield how many right and wrong tracks have the grades good and do not use.
+
+    There is a row for each number of cameras, and for odd and even bodies: with the
+    present limits, and with those that are chosen on the other half of the bodies.
+    """
+    halves = [[row for row in rows if row["body"] % 2 == odd] for odd in (0, 1)]
+    chosen = [chosen_limits(half) for half in halves]
+    names = ("even", "odd")
+    for name, limits in zip(names, chosen, strict=True):
+        texts = [f"{sign} {limit:.3g}" for sign, limit in limits.doubtful.items()]
+        yield (
+            f"chosen on {name} bodies: doubtful from {', '.join(texts)}; "
+            f"{limits.together} together make a track unusable"
+        )
+    yield ""
+    heads = ["limits", "cameras", "bodies", "right: good", "wrong: good"]
+    heads += ["right: do not use", "wrong: do not use"]
+    present = present_limits()
     cells = []
-    for views, odd in product(PLACES, (0, 1)):
-        some = [row for row in rows if row["views"] == views and row["body"] % 2 == odd]
-        right = [row["trust"]["grade"] for row in some if row["mpjpe_mm"] <= RIGHT_MM]
-        wrong = [row["trust"]["grade"] for row in some if row["mpjpe_mm"] >= WRONG_MM]
-        good = [f"{grades.count('good')} of {len(grades)}" for grades in (right, wrong)]
-        cells.append([str(views), "odd" if odd else "even", *good])
-    yield from markdown(["cameras", "bodies", "right: good", "wrong: good"], cells, 2)
+    for which, views, odd in product(("present", "chosen"), PLACES, (0, 1)):
+        some = [row for row in halves[odd] if row["views"] == views]
+        limits = present if which == "present" else chosen[1 - odd]
+        cells.append([which, str(views), names[odd], *Verdicts.of(some, limits).cells])
+    yield from markdown(heads, cells, 3)
 
 
 def seeds_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
@@ -927,10 +1035,12 @@ def main(folder: Path, legs: bool, report: bool, workers: int | None) -> None:
     click.echo(
         f"{len(films)} of {len(shots()) - SEVERAL * (SEEDS - 1)} films were tracked"
     )
+    with_legs = earlier(str(folder / "legs.jsonl"), lambda row: row["name"])
+    judged = [row for row in with_legs.values() if "refused" not in row]
     for lines in (
         intervals_lines([film_of(folder, row) for row in films]),
         accuracy_lines(films),
-        verdict_lines(films),
+        verdict_lines([*films, *judged]),
         seeds_lines(tracked),
         limps_lines([row for row in films if row["situation"] == "limp"]),
     ):

@@ -7,6 +7,7 @@
 | `cheapest` | the frames of the cheapest hypothesis | trajectory.py |
 | `retrack_spins` | frames tracked again if the body spins | restarts.py |
 | `smooth` | footage: a smooth path, planted feet, fitted contours | smoothing/ |
+| `with_straight_legs` | one camera: straighter legs | smoothing/standing.py |
 | `with_cheapest_legs` | one camera: some frames' legs exchanged | smoothing/legs.py |
 | `tracked_again` | several cameras: back, then onward | restarts.py |
 | `evaluate` | errors against the truth, or signs of trust | evaluate.py |
@@ -58,6 +59,7 @@ from posefit.tracking.result import Track
 from posefit.tracking.smoothing.contours import Borders
 from posefit.tracking.smoothing.legs import with_cheapest_legs
 from posefit.tracking.smoothing.smooth import Smoothed, smooth
+from posefit.tracking.smoothing.standing import with_straight_legs
 from posefit.tracking.trajectory import (
     Hypothesis,
     Tracked,
@@ -275,8 +277,9 @@ def _smoothed(
     usable = sum(observation.usable for observation in scene.observations)
     if len(scene.cameras) > 1 or scene.truth is not None or usable < SHORTEST:
         return smoothed
+    frames, smoothed = with_straight_legs(tracked, smoothed, beta, borders)
     smoothed, exchanged = with_cheapest_legs(
-        tracked.frames, smoothed, beta, task.threads, borders
+        frames, smoothed, beta, task.threads, borders
     )
     if exchanged.any():
         progress.log(

@@ -61,7 +61,7 @@ def smooth(
     motion = smooth_path(motion, visibility)
     areas, costs = drawn(scene, motion, np.arange(len(motion)), beta)
     smoothed = [
-        _moved(frame, motion.poses[k], motion.translations[k], cost, areas[:, k])
+        moved(frame, motion.poses[k], motion.translations[k], cost, areas[:, k])
         for k, (frame, cost) in enumerate(zip(frames, costs.tolist(), strict=True))
     ]
     if shape is not None:
@@ -149,7 +149,7 @@ def steadied(motion: Motion, visibility: Visibility) -> Motion:
     return replace(motion, poses=np.where(alone, angles, motion.poses))
 
 
-def _moved(frame: Frame, pose: Array, place: Array, cost: float, areas: Areas) -> Frame:
+def moved(frame: Frame, pose: Array, place: Array, cost: float, areas: Areas) -> Frame:
     """Return a frame at another pose and place, with its cost and areas there."""
     posterior = frame.posterior
     if posterior is not None:
