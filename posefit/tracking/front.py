@@ -161,7 +161,7 @@ def fit(
     known = [option.name for option in fields(TrackOptions) if option.name != "frames"]
     _check_names("fit", options, [*_ARGUMENTS, *known])
     if frame is None:
-        frame = first_of(_resolved(source))
+        frame = first_of(_resolved(source), options.get("fps"))
     frame = whole("frame", frame, 0)
     return track(source, frames=(frame, frame + 1), **options).frame(0)
 
