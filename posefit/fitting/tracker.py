@@ -48,8 +48,8 @@ RELOCALISE_GAP = 5  # frames without the person, about a sixth of a second. Ours
 COORDINATES = "coordinates"
 # Evaluations of a frame. With fewer, a guess would leave too few for a search. Ours.
 MIN_GUESSED_EVALUATIONS = 100
-# The share of a frame's evaluations that compare the guessed poses, at most: in pictures
-# of less than 80 rows each comparison is a whole evaluation. Ours.
+# The share of a frame's evaluations that compare guessed poses, at most: in pictures of
+# less than 80 rows each comparison is a whole evaluation. Ours.
 GUESS_SHARE = 0.25
 
 
