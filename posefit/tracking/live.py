@@ -212,16 +212,13 @@ def write_live(
                     on_frame(live)
     except KeyboardInterrupt:
         pass
-    except BaseException:
+    finally:
         if folder is not None and not latencies:
-            # a failed start leaves nothing behind, so that the same command can be
+            # without a pose nothing is left behind, so that the same command can be
             # repeated
             (folder / FRAMES_FILE).unlink(missing_ok=True)
             folder.rmdir()
-            folder = None
-        raise
-    finally:
-        if folder is not None:
+        elif folder is not None:
             text = (folder / FRAMES_FILE).read_text("utf-8")
             rows = [json.loads(line) for line in text.splitlines()]
             poses = np.radians([row["pose_degrees"] for row in rows])
