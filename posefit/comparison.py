@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 class Comparison:
     """The results of `posefit.compare`, and all others in the same folder.
 
-    Rows of a factory from earlier calls have another `version`. Without `out`, the ledger is in a temporary folder that is removed with this object.
-    The pickle of such an object contains the ledger; unpickling writes it to a new
-    temporary folder.
+    Rows of a factory from earlier calls have another `version`. Without `out`, the
+    ledger is in a temporary folder that is removed with this object. The pickle of such
+    an object contains the ledger; unpickling writes it to a new temporary folder.
 
     Attributes:
         folder: The folder of the ledger.
