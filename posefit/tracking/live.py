@@ -108,6 +108,10 @@ def track_live(
         value = getattr(chosen, each.name)
         if not declared(each).live and value != each.default:
             raise InputError(f"{each.name} must be left out with live, got {value}")
+    # nor can people be told apart before all frames are known, whoever asks for one
+    if chosen.extraction is not None and chosen.extraction.person is not None:
+        person = chosen.extraction.person
+        raise InputError(f"person must be left out with live, got {person}")
     if chosen.method is None or isinstance(chosen.method, str):
         chosen = chosen.changed(method=str(method_names(chosen.method or LIVE_METHOD)))
     chosen = completed(chosen.changed(body_frames=0, smooth=False), None)

@@ -323,6 +323,11 @@ def test_guesses_about_a_stream_are_logged_and_the_calibrations_unit_counts(
     [
         ({"hypotheses": 2}, "hypotheses must be left out with live, got 2"),
         ({"smooth": True}, "smooth must be left out with live, got True"),
+        ({"person": 2}, "person must be left out with live, got 2"),
+        (
+            {"extraction": Extraction(person=2)},
+            "person must be left out with live, got 2",
+        ),
         (
             {"extraction": Extraction("median")},
             "extraction applies only to video, got .* for masks",
