@@ -166,7 +166,7 @@ def compare(
     if factories and folder.exists():
         names = ", ".join(factories)
         say(
-            f"cells of {names} run again, and earlier rows of them in {folder} are kept "
+            f"cells of {names} run again, and their earlier rows in {folder} are kept "
             "with another version: only rows of registered methods are reused"
         )
     try:
