@@ -30,11 +30,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """The results of `posefit.compare`.
+    """The results of `posefit.compare`, and all others in the same folder.
 
-    Without `out`, the ledger is in a temporary folder that is removed with this object.
-    The pickle of such an object contains the ledger; unpickling writes it to a new
-    temporary folder.
+    Rows of a factory from earlier calls have another `version`. Without `out`, the
+    ledger is in a temporary folder that is removed with this object. The pickle of such
+    an object contains the ledger; unpickling writes it to a new temporary folder.
 
     Attributes:
         folder: The folder of the ledger.
@@ -166,8 +166,8 @@ def compare(
     if factories and folder.exists():
         names = ", ".join(factories)
         say(
-            f"cells of {names} run again, although {folder} may contain them: "
-            "only rows of registered methods are reused"
+            f"cells of {names} run again, and their earlier rows in {folder} are kept "
+            "with another version: only rows of registered methods are reused"
         )
     try:
         tally = swept(plan, folder, pool, say)

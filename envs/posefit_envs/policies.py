@@ -77,7 +77,9 @@ def rollout(
         seed: The seed; environment i of a vector has `seed` + i.
     """
     rows = rows_of(env)
-    numbers = [instance] * rows.count if isinstance(instance, int) else instance
+    numbers: Any = instance
+    if isinstance(instance, int | np.integer):
+        numbers = [instance] * rows.count
     options = [{"instance": number} for number in numbers]
     seeds = list(range(seed, seed + rows.count))
     vector = isinstance(env, VectorEnv)

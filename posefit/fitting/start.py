@@ -6,6 +6,7 @@ prior's latents, and a first population is drawn around all of them. An optimise
 this as the `start` of its space.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -56,26 +57,38 @@ def modes_apart(
     return modes
 
 
-def start_in(cost: SilhouetteCost, modes: Sequence[tuple[float, Posterior]]) -> Start:
+def start_in(
+    cost: SilhouetteCost,
+    modes: Sequence[tuple[float, Posterior]],
+    evaluations: float = math.inf,
+) -> Start:
     """Return the start of a search around modes, with the others; see `starts_in`."""
-    first, *others = starts_in(cost, modes)
+    first, *others = starts_in(cost, modes, evaluations)
     return replace(first, others=others)
 
 
 def starts_in(
-    cost: SilhouetteCost, modes: Sequence[tuple[float, Posterior]]
+    cost: SilhouetteCost,
+    modes: Sequence[tuple[float, Posterior]],
+    evaluations: float = math.inf,
 ) -> list[Start]:
     """Return a start around each mode, the likeliest first.
 
     The poses of a mode are projected onto the latents, and the start is around the pose
     of least cost in a small picture. These costs give the modes new weights, because a
     space that cannot represent a pose need not be searched there.
+
+    Args:
+        cost: The cost of a proposal for the frame.
+        modes: The modes, each with its weight.
+        evaluations: What the costs may take, at most.
+
     """
     space = cost.space
     side = min(cost.silhouettes[0].size)
     factor = min(max(side // MIN_SMALL_SIDE, 1), MAX_FACTOR)
     projected = []
-    for _, mode in modes:
+    for _, mode in _likeliest(modes, evaluations * factor**2):
         projected.append(
             space.proposals(coordinates_of(space, mode.poses, mode.translations))
         )
@@ -92,6 +105,26 @@ def starts_in(
         weight = float(np.exp((least - each) / TEMPERATURE).sum())
         starts.append(Start(poses[each.argmin()], spread, velocity, weight))
     return sorted(starts, key=lambda start: -start.weight)
+
+
+def _likeliest(
+    modes: Sequence[tuple[float, Posterior]], most: float
+) -> Sequence[tuple[float, Posterior]]:
+    """Return modes with the same share of the poses of each, `most` poses in all.
+
+    Each keeps its medoid and the poses with the highest weights.
+    """
+    share = most / sum(len(mode.poses) for _, mode in modes)
+    if share >= 1.0:
+        return modes
+    fewer = []
+    for weight, mode in modes:
+        count = max(int(share * len(mode.poses)), 1)
+        others = 1 + np.argsort(-mode.weights[1:], kind="stable")[: count - 1]
+        rows = np.append(0, others)
+        kept = Posterior(mode.poses[rows], mode.translations[rows], mode.weights[rows])
+        fewer.append((weight, kept))
+    return fewer
 
 
 def coordinates_of(space: SearchSpace, poses: Array, translations: Array) -> Array:

@@ -48,6 +48,9 @@ RELOCALISE_GAP = 5  # frames without the person, about a sixth of a second. Ours
 COORDINATES = "coordinates"
 # Evaluations of a frame. With fewer, a guess would leave too few for a search. Ours.
 MIN_GUESSED_EVALUATIONS = 100
+# The share of a frame's evaluations that compare guessed poses, at most: in pictures of
+# less than 80 rows each comparison is a whole evaluation. Ours.
+GUESS_SHARE = 0.25
 
 
 @dataclass(frozen=True)
@@ -459,7 +462,7 @@ class Predictor:
                     beta=self._prediction.beta,
                     blank=True,
                 )
-                start = start_in(cost, modes)
+                start = start_in(cost, modes, GUESS_SHARE * task.evaluations)
         return start, math.ceil(drawn.poses / len(task.cameras))
 
     def _next_space(self, anchor: Array | None) -> SearchSpace:
@@ -556,6 +559,11 @@ class SynthesisTracker:
                 yield latest
                 continue
             budget = task.evaluations - predictor.guess_evaluations
+            if budget < 1:
+                raise InputError(
+                    f"evaluations must be more than the {predictor.guess_evaluations} "
+                    f"that the start took to guess the pose, got {task.evaluations}"
+                )
             # Only for a single picture, because later frames cannot correct it. A track
             # recovers from the wrong mode with one swarm as well.
             alone = self.next_frame == "start" and len(task.modes) > 1

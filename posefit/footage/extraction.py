@@ -8,6 +8,7 @@ from typing import Any, cast
 
 from posefit.errors import InputError
 from posefit.fitting.validation import plugin_errors
+from posefit.footage.options import checked_person
 from posefit.footage.people import Choice
 from posefit.footage.quality import PEOPLE_SEGMENTER
 from posefit.reading import quoted
@@ -37,7 +38,7 @@ class Extraction:
         ignore: An image whose bright pixels are never known, such as a tree in front.
         width: Videos that are wider are scaled down to this width.
         person: Which of several people is followed, see `People.chosen`. A point is in
-            the video's pixels.
+            the video's pixels. The option `person` of a track does the same.
         settings: The segmenter's own settings.
 
     Raises:
@@ -64,6 +65,9 @@ class Extraction:
             raise InputError(
                 f"width must lie in {least} to {most} pixels, got {self.width}"
             )
+        if self.person is not None:
+            person = checked_person("person", self.person)
+            object.__setattr__(self, "person", person)
         offer = registry().offer("segmenter", self.name)
         settings = dict(self.settings)
         if self.background is not None:

@@ -34,7 +34,7 @@ from posefit.footage.readers import (
 from posefit.footage.video import Video
 from posefit.footage.views import Range, View
 from posefit.motion import built_in, recorded
-from posefit.motion.clips import MOTIONS
+from posefit.motion.clips import FPS, MOTIONS
 from posefit.motion.motion import Motion
 from posefit.reading import existing
 
@@ -89,8 +89,8 @@ class Kind(NamedTuple):
     view: Callable[[Any, Range, Any, float | None], View] | None = None
     # (place, fps, width) to the film, scaled down to the width
     film: Callable[[Any, float | None, int], Video] | None = None
-    # place to the number of its first frame; None if frames are counted from 0
-    first: Callable[[Any], int] | None = None
+    # (place, fps) to the number of its first frame; None if frames are counted from 0
+    first: Callable[[Any, float | None], int] | None = None
     has_categories: bool = False  # whether a label may be a category's name
 
 
@@ -123,16 +123,26 @@ def _ends_in(suffix: str) -> Callable[[Place], bool]:
     return lambda place: isinstance(place, Path) and place.suffix.lower() == suffix
 
 
+def _first_of_motion(place: Place, fps: float | None) -> int:
+    """Return the number of a motion's first frame, which only a cut motion states."""
+    return place.first_at(fps or FPS) if isinstance(place, Motion) else 0
+
+
 # the first kind that recognises a source reads it
 KINDS = (
     Kind("masks", lambda place: isinstance(place, np.ndarray), view=read_array),
-    Kind("masks", _ends_in(".npz"), view=read_npz, first=first_number),
+    Kind(
+        "masks",
+        _ends_in(".npz"),
+        view=read_npz,
+        first=lambda place, _: first_number(place),
+    ),
     Kind("masks", _ends_in(".npy"), view=read_npy),
     Kind("masks", _ends_in(ANNOTATIONS), view=read_annotations, has_categories=True),
     Kind("pictures", _is_film, film=Video.of_pictures),
     Kind("masks", lambda place: isinstance(place, Images), view=read_images),
     Kind("video", _is_video, film=lambda place, _, width: Video.of(place, width)),
-    Kind("motion", lambda _: True),  # names of motions need no suffix
+    Kind("motion", lambda _: True, first=_first_of_motion),  # names need no suffix
 )
 
 
@@ -226,12 +236,18 @@ def _with_numbers(places: Sequence[Place]) -> list[Place]:
     return numbered
 
 
-def first_of(source: Resolved) -> int:
-    """Return the number of the first frame that all cameras have."""
+def first_of(source: Resolved, fps: float | None = None) -> int:
+    """Return the number of the first frame that all cameras have.
+
+    Args:
+        source: The source.
+        fps: Frames per second, at which a motion is resampled.
+
+    """
     first = 0
     for kind, place in zip(source.kinds, source.places, strict=True):
         if kind.first is not None:
-            first = max(first, kind.first(place))
+            first = max(first, kind.first(place, fps))
     return first
 
 

@@ -119,8 +119,10 @@ class Stream:
                     self._latest = LiveImage(self.count, time.perf_counter(), image)
                     self.count += 1
                     self._changed.notify()
-        except (InputError, OSError) as error:
-            self._error = InputError(f"{self.name}: {error}, after {self.count} frames")
+        # an error that ended this thread alone would look like the end of the stream
+        except Exception as error:
+            cause = str(error) or type(error).__name__
+            self._error = InputError(f"{self.name}: {cause}, after {self.count} frames")
         finally:
             with self._changed:
                 self._ended = True

@@ -59,7 +59,8 @@ def _range(name: str, value: Any) -> tuple[int | None, int | None]:
     return first, last
 
 
-def _person(name: str, value: Any) -> "Choice":
+def checked_person(name: str, value: Any) -> "Choice":
+    """Return the number or the place of a person. Raises InputError for others."""
     if is_whole(value):
         return whole(name, value, 1)
     across, down = pair(name, value, "a number, or (across, down) in pixels")
@@ -265,7 +266,7 @@ class SourceOptions(Options):
         None,
         "Person to track if there are several: the number in the warning (1 is visible "
         "the longest), or the position X,Y given there.",
-        _person,
+        checked_person,
         "N|X,Y",
         parse=text_person,
         live=False,

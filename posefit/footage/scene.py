@@ -86,7 +86,7 @@ def synthetic(
             around the person, so that it frames the whole motion. 0 is in front.
         size: Width and height of these cameras' pictures.
         cameras: Cameras to use instead.
-        frames: Which frames of the motion to use.
+        frames: Which frames of the motion to use, by their numbers.
         guesses: What was guessed about the cameras.
 
     Raises:
@@ -95,7 +95,7 @@ def synthetic(
     """
     body = Body.of(motion.skeleton)
     placing: Placing = "given" if cameras else "placed"
-    motion = motion.frames(*span(frames, len(motion)))
+    motion = motion.frames(*span(frames, len(motion), motion.first))
     if not cameras:
         joints = motion.joints.reshape(-1, 3)
         radii = np.tile(body.joint_radii(), len(motion))
@@ -106,8 +106,9 @@ def synthetic(
     observations = rendered(motion, body, cameras)
     for k in (0, len(motion) - 1):
         if not all(silhouette.mask.any() for silhouette in observations[k].silhouettes):
+            number = motion.first + k
             raise InputError(
-                f"camera must see the person, got an empty mask in frame {k}"
+                f"camera must see the person, got an empty mask in frame {number}"
             )
     return Scene(
         name=motion.name,

@@ -90,7 +90,7 @@ def _of_footage(source: Resolved, options: SourceOptions, progress: Progress) ->
             f"got {len(options.degrees)}"
         )
     person = FilmedBody.of(options)
-    how = replace(options.extraction or Extraction(), person=options.person)
+    how = _segmented_person(options)
     films = films_of(source, how.width, options.fps)
     filmed: Sequence[tuple[int, int] | None] = [film.filmed for film in films]
     filmed = filmed or [None] * len(source.places)
@@ -104,6 +104,19 @@ def _of_footage(source: Resolved, options: SourceOptions, progress: Progress) ->
     wanted = options.label if options.category is None else options.category
     views = views_of_masks(source, options.frames, wanted, options.fps)
     return combine(_of_one_person(views, known, options))
+
+
+def _segmented_person(options: SourceOptions) -> Extraction:
+    """Return how to segment the person whom the options or their extraction choose."""
+    how = options.extraction or Extraction()
+    if options.person is None:
+        return how
+    if how.person not in (None, options.person):
+        raise InputError(
+            "person must be given once, or the same twice, "
+            f"got {quoted(options.person)}, and {quoted(how.person)} of the extraction"
+        )
+    return replace(how, person=options.person)
 
 
 def _placed(

@@ -134,6 +134,10 @@ class Motion:
         object.__setattr__(backwards, "_forwards", self)
         return backwards
 
+    def first_at(self, fps: float) -> int:
+        """Return the number that the first frame has at another rate."""
+        return round(self.first / (self.fps / fps))
+
     def resampled(self, fps: float) -> "Motion":
         """Return the motion at another rate, at the times k / fps within it.
 
@@ -148,7 +152,7 @@ class Motion:
         fps = _rate(fps)
         ratio = self.fps / fps
         step = round(ratio)
-        first = round(self.first / ratio)
+        first = self.first_at(fps)
         if step >= 1 and abs(ratio - step) < 1e-9 * step:
             poses = self.poses[::step]
             translations = self.translations[::step]

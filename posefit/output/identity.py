@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from posefit.errors import InputError
+from posefit.geometry.calibration.read import file_and_name
 from posefit.reading import cut
 
 # one argument of a track: "text" is its wording in messages, and "digest" is the
@@ -25,7 +26,7 @@ def digest_of(value: Any, files: bool = False) -> Digest:
     """Return the digest of a value.
 
     With `files`, a string that names a file or folder counts as the content of that
-    file or folder.
+    file or folder. FILE:NAME, a camera of a calibration, names a file, too.
     """
     content = json.dumps(_plain(value, files), sort_keys=True, separators=(",", ":"))
     return {
@@ -61,7 +62,7 @@ def _plain(value: Any, files: bool) -> Any:
     if value is None or isinstance(value, bool | int | float):
         return value
     if isinstance(value, str | Path):
-        return ["text", str(value), _content(Path(value)) if files else None]
+        return ["text", str(value), _content(_file(value)) if files else None]
     if isinstance(value, np.ndarray | np.generic):
         array = np.ascontiguousarray(value)
         digest = hashlib.sha256(array.tobytes()).hexdigest()
@@ -84,6 +85,12 @@ def _plain(value: Any, files: bool) -> Any:
         return [kind, [[name, same(getattr(value, name))] for name in names]]
     attributes = getattr(value, "__dict__", None)
     return [kind, same(attributes) if attributes is not None else repr(value)]
+
+
+def _file(value: str | Path) -> Path:
+    """Return the path that a string names."""
+    path = Path(value)
+    return path if path.exists() else file_and_name(path)[0]
 
 
 def _content(path: Path) -> Any:

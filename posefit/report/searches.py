@@ -141,7 +141,9 @@ class Searches:
         """Return the shares of missed targets (methods, blocks, 1), in percent.
 
         A block is an instance of a function, which has the same pose in every
-        dimension. Its share is the mean over seeds and dimensions.
+        dimension. It counts as often as it has runs, because functions may exist in
+        different numbers of dimensions: so the mean of the blocks is that of the runs,
+        and the difference of two methods is that of their scores.
         """
         fields = [
             contest.instance_field(name) for name in ("function", "instance", "suite")
@@ -151,8 +153,8 @@ class Searches:
         block = np.array([index[pose] for pose in poses])  # (runs,)
         missed = 100.0 - contest.scores  # (methods, runs)
         sums = np.array([np.bincount(block, row) for row in missed])
-        means = sums / np.bincount(block)  # (methods, blocks)
-        return np.asarray(means[:, :, None])
+        weighted = sums / np.bincount(block).mean()  # (methods, blocks)
+        return np.asarray(weighted[:, :, None])
 
     def figures(self, runs: Runs, rows: Indices) -> dict[str, float | None]:
         """Return the averages of some rows."""

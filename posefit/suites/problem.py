@@ -6,6 +6,7 @@ the same names as in COCO, so loops written for COCO run on it unchanged.
 A suite may get more problems. Everything else about it never changes.
 """
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import product
 from typing import Any, Literal, final
@@ -274,6 +275,14 @@ class Suite:
             raise InputError(
                 "a suite must contain at least one problem, "
                 f"got none in {list(dimensions)} dimensions"
+            )
+        # a problem that came twice would count twice in a score
+        problem, times = Counter(self._addresses).most_common(1)[0]
+        if times > 1:
+            number, instance, dimension = problem
+            raise InputError(
+                "the problems of a suite must differ, "
+                f"got f{number} instance {instance} in {dimension}D twice"
             )
 
     @property

@@ -145,9 +145,11 @@ def search_method(entry: Mapping[str, Any]) -> dict[str, Any]:
                 f"settings must name {optimiser}.{setting} once, got it twice"
             )
         chosen[setting] = value
+    # as texts, like those of tracks: a plan has no other form of None
+    texts = settings.settings_text(chosen)
     return {
         **entry,
-        "settings": settings.check(method, registry().optimiser(method), chosen),
+        "settings": settings.parse_texts(method, registry().optimiser(method), texts),
     }
 
 

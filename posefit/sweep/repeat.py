@@ -117,7 +117,7 @@ def plan_tables(spec: Mapping[str, Any]) -> dict[str, Any]:
     """Return the tables of a plan whose only cell has this spec."""
     if spec["kind"] == "track":
         return {"cells": [track_fields(spec)]}
-    method = {"method": spec["method"], "settings": spec["settings"]}
+    method = {"method": spec["method"], "settings": _texts(spec["settings"])}
     if spec["name"]:
         method["name"] = spec["name"]
     return {
@@ -137,11 +137,14 @@ def track_fields(spec: Mapping[str, Any]) -> dict[str, Any]:
     fields = {name: spec[name] for name in FIELDS if name in spec}
     if not fields.get("name", True):
         del fields["name"]
-    # TOML has no null, so write settings as texts, which are parsed when they are read
     if "settings" in fields:
-        settings = fields["settings"].items()
-        fields["settings"] = {name: setting_text(value) for name, value in settings}
+        fields["settings"] = _texts(fields["settings"])
     return fields
+
+
+def _texts(settings: Mapping[str, Any]) -> dict[str, str]:
+    """Return settings as texts, which a plan parses: TOML has no null."""
+    return {name: setting_text(value) for name, value in settings.items()}
 
 
 def repeat_command(spec: Mapping[str, Any]) -> str:

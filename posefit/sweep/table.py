@@ -31,6 +31,9 @@ ORDER = (
     "motion",
     "view_degrees",
     "corruption",
+    "suite",
+    "function",
+    "dimension",
     "instance",
     "method",
     "settings",
@@ -72,7 +75,9 @@ def dataframe(rows: Iterable[Mapping[str, Any]]) -> "pd.DataFrame":
     )
     if table.empty:
         return table.reindex(columns=list(_TEXTS))
-    return table.sort_values(list(ORDER), ignore_index=True)
+    # tracks have no function, and searches no motion
+    order = [name for name in ORDER if name in table]
+    return table.sort_values(order, ignore_index=True)
 
 
 def flat(row: Mapping[str, Any]) -> dict[str, Any]:

@@ -5,7 +5,7 @@ They complete the options, make a scene from the source, and track it.
 
 import inspect
 import textwrap
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, TypeGuard, Unpack
@@ -13,6 +13,7 @@ from typing import Any, TypeGuard, Unpack
 from posefit.errors import InputError
 from posefit.fitting.check import whole
 from posefit.fitting.driving import clocks
+from posefit.footage.extraction import Extraction
 from posefit.footage.kinds import Resolved, first_of, resolve
 from posefit.footage.named import Footage
 from posefit.footage.options import SourceOptions
@@ -34,12 +35,13 @@ from posefit.output.folder import OutputFolder, Recorder
 from posefit.output.identity import Digest, digest_of
 from posefit.progress import Progress, interactive
 from posefit.reading import quoted, suggestion
+from posefit.registry import registry, version_of
 from posefit.tracking.defaults import completed
 from posefit.tracking.keywords import FitKeywords, TrackKeywords
+from posefit.tracking.method import offers_of
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.pipeline import track_scene
 from posefit.tracking.result import Fit, Track
-from posefit.version import __version__
 
 # the arguments of a track that are not fields of TrackOptions
 _ARGUMENTS = ("out", "force", "resume", "write", "progress")
@@ -161,7 +163,7 @@ def fit(
     known = [option.name for option in fields(TrackOptions) if option.name != "frames"]
     _check_names("fit", options, [*_ARGUMENTS, *known])
     if frame is None:
-        frame = first_of(_resolved(source))
+        frame = first_of(_resolved(source), options.get("fps"))
     frame = whole("frame", frame, 0)
     return track(source, frames=(frame, frame + 1), **options).frame(0)
 
@@ -253,7 +255,8 @@ def _identity(
     for option in fields(options):
         if declared(option).identifies:
             values[option.name] = getattr(options, option.name)
-    values |= {"source": source.named, "train": train, "version": __version__}
+    values |= {"source": source.named, "train": train}
+    values["version"] = version_of(_origins(source, options))
     # the skeleton in the folder of an .amc counts as if it were given
     skeletons = []
     for motion in (*source.named, *options.train):
@@ -266,6 +269,22 @@ def _identity(
     if source.medium == "motion" and source.named[0] in built_in.names():
         read.discard("source")
     return {name: digest_of(value, name in read) for name, value in values.items()}
+
+
+def _origins(source: Resolved, options: TrackOptions) -> Iterator[str]:
+    """Yield the origins of the named plugins that a track's frames depend on."""
+    # objects that the caller made have no origin
+    if isinstance(options.method, str):
+        optimiser, prior = offers_of(options.method)
+        yield optimiser.origin
+        if isinstance(prior, str):
+            yield registry().offer("prior", prior).origin
+    for start in registry().offers["start"].values():
+        yield start.origin
+    if source.medium in ("video", "pictures"):
+        extraction = options.extraction or Extraction()
+        for way in extraction.ways(len(source.named)):
+            yield registry().offer("segmenter", way.name).origin
 
 
 def _documented(function: Callable[..., Any]) -> None:

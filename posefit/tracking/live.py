@@ -108,6 +108,10 @@ def track_live(
         value = getattr(chosen, each.name)
         if not declared(each).live and value != each.default:
             raise InputError(f"{each.name} must be left out with live, got {value}")
+    # nor can people be told apart before all frames are known, whoever asks for one
+    if chosen.extraction is not None and chosen.extraction.person is not None:
+        person = chosen.extraction.person
+        raise InputError(f"person must be left out with live, got {person}")
     if chosen.method is None or isinstance(chosen.method, str):
         chosen = chosen.changed(method=str(method_names(chosen.method or LIVE_METHOD)))
     chosen = completed(chosen.changed(body_frames=0, smooth=False), None)
@@ -212,16 +216,13 @@ def write_live(
                     on_frame(live)
     except KeyboardInterrupt:
         pass
-    except BaseException:
+    finally:
         if folder is not None and not latencies:
-            # a failed start leaves nothing behind, so that the same command can be
+            # without a pose nothing is left behind, so that the same command can be
             # repeated
             (folder / FRAMES_FILE).unlink(missing_ok=True)
             folder.rmdir()
-            folder = None
-        raise
-    finally:
-        if folder is not None:
+        elif folder is not None:
             text = (folder / FRAMES_FILE).read_text("utf-8")
             rows = [json.loads(line) for line in text.splitlines()]
             poses = np.radians([row["pose_degrees"] for row in rows])

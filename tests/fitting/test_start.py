@@ -4,14 +4,17 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 import posefit
-from posefit import SearchSpace, SilhouetteCost
+from posefit import Optimiser, SearchSpace, SilhouetteCost
 from posefit.fitting.start import MODE_SPREAD, modes_apart, start_in
 from posefit.fitting.tracker import Observation, Task, guessed_modes
 from posefit.motion import built_in
 from posefit.plugin import Posterior, Start, draw_population
+from posefit.silhouette.drawn import PoseCount
 from posefit.testing.toy import Toy
+from tests.cases import each
 
 WALK = built_in.motion("walk-a", frames=40)
 PRIOR = posefit.prior("pca")().fit(WALK.poses[:, 3:], WALK.skeleton)
@@ -97,3 +100,65 @@ def test_nothing_is_guessed_for_a_known_pose_or_an_empty_mask() -> None:
     assert not guessed_modes(replace(task, first_pose=WALK.poses[0, 3:]), observation)
     assert not guessed_modes(task, replace(observation, usable=False))
     assert not guessed_modes(replace(task, start=None), observation)
+
+
+@each("size", [(48, 36), (96, 72), (160, 120)])
+@each("evaluations", [100, 200, 400])
+@each("views", [1, 2])
+def test_a_guess_leaves_most_of_any_budget_to_the_search(
+    size: tuple[int, int], evaluations: int, views: int
+) -> None:
+    body = posefit.Body.of(WALK.skeleton)
+    place = WALK.translations[20]
+    cameras = [posefit.Camera.around(place, 0.3 + k, 5.0, size) for k in range(views)]
+    masks = [posefit.project(body, each, WALK.poses[20], place) for each in cameras]
+    observation = Observation([posefit.Silhouette.of(mask) for mask in masks])
+    # two modes, of many poses that are nearly the same
+    rows = [20] * 240
+    turns = [*np.linspace(-0.05, 0.05, 120), *np.linspace(2.0, 2.1, 120)]
+    guess = SimpleNamespace(posterior=lambda _: weighted(rows, turns, [1.0] * 240))
+    task = Task(body, cameras, evaluations, None, place, start=lambda _: guess)
+    pso = posefit.optimiser("pso")
+
+    def make(space: SearchSpace, rng: np.random.Generator, budget: int) -> Optimiser:
+        return pso(space, rng, population_size=40)
+
+    drawn = PoseCount()
+    with drawn.counting():
+        (frame,) = posefit.SynthesisTracker(task, PRIOR, make).track(
+            [observation], np.random.default_rng(0)
+        )
+    # rounded up, as a part of an evaluation is one
+    assert frame.evaluations == np.ceil(drawn.poses / views) <= evaluations
+    searched = frame.evaluations - int(frame.trace[0, 0]) + 1
+    assert searched >= 40
+
+
+def test_a_guess_that_takes_the_whole_budget_is_named() -> None:
+    cost = cost_of(20, 0.0)
+
+    def posterior(observation: Observation) -> Posterior:
+        posefit.pose_costs(
+            cost.body,
+            cost.cameras,
+            observation.silhouettes,
+            np.repeat(WALK.poses[20:21], 120, axis=0),
+            np.repeat(WALK.translations[20:21], 120, axis=0),
+        )
+        return weighted([20], [0.0], [1.0])
+
+    task = Task(
+        cost.body,
+        cost.cameras,
+        100,
+        None,
+        WALK.translations[20],
+        start=lambda _: SimpleNamespace(posterior=posterior),
+    )
+    tracker = posefit.SynthesisTracker(task, PRIOR, lambda *_: None)
+    with pytest.raises(ValueError, match="evaluations must be more than the 12. that"):
+        next(
+            iter(
+                tracker.track([Observation(cost.silhouettes)], np.random.default_rng(0))
+            )
+        )

@@ -252,7 +252,14 @@ def apart() -> tuple[list[Any], Any]:
 
 @each(
     ("kind", "person"),
-    [("masks", None), ("masks", 1), ("masks", 2), ("video", None), ("video", 2)],
+    [
+        ("masks", None),
+        ("masks", 1),
+        ("masks", 2),
+        ("video", None),
+        ("video", 2),
+        ("video by extraction", 2),
+    ],
 )
 def test_every_camera_follows_the_person_whom_the_first_one_follows(
     apart: tuple[list[Any], Any], kind: str, person: int | None, tmp_path: Path
@@ -270,13 +277,12 @@ def test_every_camera_follows_the_person_whom_the_first_one_follows(
             )
     path = toml(tmp_path / "two.toml", *cameras)
     how = Extraction(background=f"0:{EMPTY}")
-    view: dict[str, Any] = (
-        {"frames": (EMPTY, None), "extraction": how} if kind == "video" else {}
-    )
-    scene = scene_of(
-        sources,
-        SourceOptions(camera=[path], up="y", height=1.74, person=person, **view),
-    )
+    view: dict[str, Any] = {"person": person}
+    if kind != "masks":
+        view |= {"frames": (EMPTY, None), "extraction": how}
+    if kind == "video by extraction":
+        view |= {"person": None, "extraction": replace(how, person=person)}
+    scene = scene_of(sources, SourceOptions(camera=[path], up="y", height=1.74, **view))
     followed = 0 if person is None else person - 1
     for silhouette, people in zip(
         scene.observations[FRAMES - 5].silhouettes, shown, strict=True
@@ -293,6 +299,30 @@ def test_every_camera_follows_the_person_whom_the_first_one_follows(
         f"person {2 - followed} is followed, as by the first camera" in warning
         for warning in scene.warnings
     )
+
+
+@each("value", [2, np.int64(2), [40.0, 60], (np.float32(40), 60.0)])
+def test_the_person_of_an_extraction_is_checked_as_the_option_is(value: Any) -> None:
+    person = Extraction(person=value).person
+    assert person == SourceOptions(person=value).person
+    assert person in (2, (40.0, 60.0))
+
+
+@each("value", [0, -1, "2", 1.5, True, [1, 2, 3]])
+def test_no_other_value_is_the_person_of_an_extraction(value: Any) -> None:
+    for options in (Extraction, SourceOptions):
+        with pytest.raises(ValueError, match="person must be"):
+            options(person=value)
+
+
+def test_two_choices_of_a_person_are_refused(tmp_path: Path) -> None:
+    source = film(tmp_path / "a.avi", [NOBODY] * 3, [NOBODY] * 3)
+    for person in (1, (40.0, 60.0)):
+        options = SourceOptions(person=person, extraction=Extraction(person=2))
+        with pytest.raises(
+            ValueError, match=r"person must be given once, .*, and 2 of the extraction"
+        ):
+            scene_of([source], options)
 
 
 def test_everything_that_is_guessed_is_reported(tmp_path: Path) -> None:

@@ -140,6 +140,26 @@ def test_motions_keep_their_numbers_and_a_cut_is_that_of_the_source(
     np.testing.assert_allclose(chosen.truth.joints, cut.truth.joints, atol=1e-5)
 
 
+@pytest.mark.parametrize("fps", [FPS, 2 * FPS, FPS / 2])
+def test_a_cut_motion_is_cut_again_and_fitted_by_the_numbers_that_it_has(
+    fps: float,
+) -> None:
+    whole = posefit.load_motion("walk", FPS)
+    cut = whole.frames(10, 20)
+    # by hand: 20 frames after the first ten, at the other rate
+    start = round(10 * fps / FPS)
+    chosen = seen(cut, fps=fps, frames=(start + 2, start + 4))
+    assert (chosen.first, chosen.count) == (start + 2, 2)
+    same = cut.resampled(fps).joints[2:4]
+    np.testing.assert_allclose(chosen.truth.joints, same, atol=1e-12)
+    with pytest.raises(InputError, match=f"frames {start}:"):
+        seen(cut, fps=fps, frames=(0, 2))
+    how = {"method": "random@loose", "evaluations": 40, "progress": QUIET, "fps": fps}
+    for frame in (None, start + 3):
+        table = posefit.fit(cut, frame=frame, **how).track.to_pandas()
+        assert table["frame"].tolist() == [frame or start]
+
+
 @pytest.mark.parametrize("name", NAMED)
 def test_named_motions_keep_their_numbers(name: str) -> None:
     check_numbered(seen(NAMED[name], frames=(START, STOP), fps=FPS), START, STOP)

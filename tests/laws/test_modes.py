@@ -166,7 +166,7 @@ def test_a_rollout_has_every_step_of_each_environments_episode(
     for i, number in enumerate((3, 4)):
         env = gym.make(FIT, **NAMES[FIT])
         policy = _policy_of(env.action_space.shape, i)
-        singles.append(rollout(env, policy, number, SEED + i))
+        singles.append(rollout(env, policy, np.int64(number), SEED + i))
     with made(form, mode, FIT) as vector:
         policies = [
             _policy_of(vector.single_action_space.shape, i) for i in range(COUNT)

@@ -67,6 +67,26 @@ def test_the_interval_is_over_instances_in_any_number_of_dimensions(
     assert rows[1]["high"] == pytest.approx(rows[0]["high"])
 
 
+def test_a_difference_is_that_of_the_scores_however_many_runs_an_instance_has(
+    tmp_path: Path,
+) -> None:
+    # function 1 has two dimensions, function 7 one: b is better in the first, a in the
+    # other, by 3 and 4 targets; so b is ahead by (2 x 3 - 4) / 3 of 29, not by -1 / 2
+    rows = []
+    for function, dimension, instance in problems([1], [9, 24], 4) + problems(
+        [7], [24], 4
+    ):
+        targets = {"a": 10, "b": 13} if function == 1 else {"a": 10, "b": 6}
+        for method, count in targets.items():
+            made = cell(method, function, dimension, instance)
+            rows.append(search_result(made, count + instance % 2))
+    board = board_of(contest_in(ledger(tmp_path / "r", rows)))
+    assert [row["name"] for row in board] == ["b", "a"]
+    behind = board[0]["reached"] - board[1]["reached"]
+    assert behind == pytest.approx(100.0 * 2.0 / 3.0 / 29.0)
+    assert board[1]["behind"] == pytest.approx(behind)
+
+
 def test_random_search_is_the_baseline_unless_it_leads_or_is_missing(
     tmp_path: Path,
 ) -> None:

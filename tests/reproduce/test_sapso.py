@@ -322,7 +322,7 @@ def test_the_swarm_of_figure_5_is_that_of_a_search(walk: PaperMotion) -> None:
     assert [poses.shape for poses in swarm.poses] == [(30, 66)] * 7
     # Interpretation S16
     settings = {"tracker.tilt": "box", "sapso.population_size": 30}
-    scene = paper_scene(walk, 45.0, (0, 1))
+    scene = paper_scene(walk, 45.0, 1)
     again = track(
         scene,
         train=walk.training,

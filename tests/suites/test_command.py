@@ -277,6 +277,8 @@ def test_the_ledger_is_a_table(results: Path) -> None:
         {1, 7},
         {"", "population_size=20"},
     )
+    problems = table[["function", "dimension", "instance"]].to_numpy().tolist()
+    assert problems == sorted(problems)
 
 
 @each(

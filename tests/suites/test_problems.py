@@ -350,6 +350,18 @@ def test_a_copy_of_a_problem_counts_for_itself(
             lambda: posefit.Suite(instances=[]),
             "instances must contain at least one number, got none",
         ),
+        (
+            lambda: posefit.Suite(functions=[1, 2, 1], instances=[3]),
+            "the problems of a suite must differ, got f1 instance 3 in 9D twice",
+        ),
+        (
+            lambda: posefit.Suite(functions=[1], dimensions=[9, 9]),
+            "must differ, got f1 instance 10000 in 9D twice",
+        ),
+        (
+            lambda: posefit.Suite(functions=[1], instances=[4, 3, np.int64(3)]),
+            "must differ, got f1 instance 3 in 9D twice",
+        ),
     ],
 )
 def test_an_object_that_is_not_a_problem_is_named(

@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from posefit.registry import register, registry
 from posefit.sweep.cell import run_cell
 from posefit.sweep.check import cell_of, search_of
 from posefit.sweep.plan import Plan
@@ -74,6 +75,33 @@ def test_the_command_is_a_plan_of_the_cell() -> None:
         assert [
             planned.key for planned in Plan.of(plan_in(repeat_command(cell.spec)))
         ] == [cell.key]
+
+
+@each("step", [None, 0.5, 2])
+def test_a_search_is_repeated_with_its_settings_whatever_their_type(
+    step: float | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("posefit.registry._own", {})
+
+    def stepping(space: Any, rng: Any, *, step: float | None = 0.1) -> Any:
+        """Never runs."""
+
+    register({"stepping": (stepping, "1")})
+    method = {"method": "stepping", "settings": {"step": step}}
+    searches = {
+        "suite": SEARCH["suite"],
+        "methods": [method],
+        "functions": [1],
+        "dimensions": [9],
+        "instances": [3],
+        "seeds": 1,
+        "budgets": [30],
+    }
+    (cell,) = Plan.of(searches)
+    assert cell.settings == {"step": step}
+    (planned,) = Plan.of(plan_in(repeat_command(cell.spec)))
+    assert planned.key == cell.key
+    registry.cache_clear()
 
 
 def test_the_command_runs_the_row_again(tmp_path: Path) -> None:

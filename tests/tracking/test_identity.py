@@ -4,20 +4,27 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
 import posefit
+from posefit.footage.extraction import Extraction
+from posefit.geometry.calibration import pinhole_matrix
 from posefit.motion import built_in
 from posefit.motion.amc import write_amc
 from posefit.motion.asf import write_asf
 from posefit.output.folder import OutputFolder
 from posefit.output.identity import digest_of
 from posefit.output.record import read_frames
+from posefit.registry import Offer
 from tests.cases import each
 from tests.files import csv_rows
 from tests.fuzz.written import SPEC, mended, written
+from tests.laws.sources import FILMS, FPS, background, masks, pictures
+from tests.laws.sources import camera as film_camera
 from tests.tracking.scenes import stopping
+from tests.tracking.test_resuming import stopped_after
 
 QUICK: dict[str, Any] = {"frames": (0, 8), "size": (120, 90), "evaluations": 200}
 
@@ -85,6 +92,82 @@ def test_a_track_does_not_go_on_with_another_skeleton(
     resumed = posefit.track(source, resume=True, **options)
     whole = posefit.track(source, **{**options, "out": None})
     np.testing.assert_array_equal(resumed.motion.poses, whole.motion.poses)
+
+
+def test_a_track_does_not_go_on_with_another_calibration_of_its_name(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "rig.toml"
+    options: dict[str, Any] = {
+        **QUICK,
+        "method": "sapso",
+        "camera": f"{file}:left",
+        "out": tmp_path / "out",
+    }
+    write_camera(file, camera(0.5))
+    with pytest.raises(KeyboardInterrupt):
+        posefit.track("walk", progress=stopping(4), **options)
+    write_camera(file, camera(1.5))
+    with pytest.raises(
+        ValueError,
+        match="camera must be .*, as before, to resume, got other content",
+    ):
+        posefit.track("walk", resume=True, **options)
+    write_camera(file, camera(0.5))
+    assert len(posefit.track("walk", resume=True, **options)) == 8
+
+
+def write_camera(path: Path, camera: posefit.Camera) -> None:
+    """Write a calibration of one camera, whose name is left."""
+    turn, _ = cv2.Rodrigues(camera.rotation)
+    lines = [
+        "[left]",
+        f"matrix = {pinhole_matrix(camera.focal, camera.centre).tolist()}",
+        f"size = [{camera.width}, {camera.height}]",
+        f"rotation = {turn.ravel().tolist()}",
+        f"translation = {camera.translation.tolist()}",
+    ]
+    path.write_text("\n".join(lines))
+
+
+@each("kind", ["optimiser", "prior", "tracker", "start", "segmenter"])
+def test_a_track_does_not_go_on_with_another_version_of_its_plugins(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    options: dict[str, Any] = {
+        "method": "vsmm" if kind == "tracker" else "sapso@pca",
+        "evaluations": 200,
+        "restarts": 0,
+        "body_frames": 0,
+        "out": tmp_path / "out",
+    }
+    source: Any = "walk-a"
+    if kind == "segmenter":
+        source = FILMS["folder of pictures"](tmp_path / "in", pictures(masks()))
+        empty = str(tmp_path / "empty.png")
+        assert cv2.imwrite(empty, background())
+        how = Extraction(background=empty)
+        options |= {"camera": film_camera(), "fps": FPS, "extraction": how}
+    else:
+        options |= QUICK
+    with monkeypatch.context() as patch:
+        stopped_after(4, patch)
+        with pytest.raises(KeyboardInterrupt):
+            posefit.track(source, **options)
+    present = Offer.origin.fget
+    assert present is not None
+
+    def changed(offer: Offer) -> str:
+        origin: str = present(offer)
+        return f"{origin} changed" if offer.kind == kind else origin
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Offer, "origin", property(changed))
+        with pytest.raises(
+            ValueError, match="version must be .*, as before, to resume"
+        ):
+            posefit.track(source, resume=True, **options)
+    assert len(posefit.track(source, resume=True, **options)) == 8
 
 
 def test_a_file_or_a_folder_is_what_it_holds(tmp_path: Path) -> None:

@@ -231,16 +231,36 @@ def test_masks_in_a_pipe_become_poses_on_disk_also_if_it_breaks_off(
     )
 
 
-def test_a_stream_that_is_stopped_before_the_first_pose_has_no_latency(monkeypatch):
+def test_a_stream_that_is_stopped_before_the_first_pose_has_no_latency_and_no_folder(
+    monkeypatch, tmp_path
+):
     def stopped(*_arguments, **_options):
         raise KeyboardInterrupt
         yield
 
     monkeypatch.setattr(tracking_live, "track_live", stopped)
-    result = CliRunner().invoke(main, ["track", "--live", "-"])
+    out = str(tmp_path / "out")
+    result = CliRunner().invoke(main, ["track", "--live", "-", "--out", out])
     assert result.exit_code == 0
     assert "no frame was tracked" in result.output
     assert "nan" not in result.output
+    assert list(tmp_path.iterdir()) == []
+
+
+@each("error", [ValueError("a bad packet"), RuntimeError(), OSError("gone")])
+def test_whatever_ends_a_stream_is_said(error):
+    image = pgm(np.eye(40, dtype=bool))
+
+    class Pipe(io.BytesIO):
+        def read(self, size=-1):
+            if self.tell() >= 2 * len(image):
+                raise error
+            return super().read(size)
+
+    stream = Stream("-", Pipe(3 * image))
+    cause = str(error) or type(error).__name__
+    with pytest.raises(InputError, match=f"-: {cause}, after 2 frames"):
+        list(stream)
 
 
 def test_guesses_about_a_stream_are_logged_and_the_calibrations_unit_counts(
@@ -303,6 +323,11 @@ def test_guesses_about_a_stream_are_logged_and_the_calibrations_unit_counts(
     [
         ({"hypotheses": 2}, "hypotheses must be left out with live, got 2"),
         ({"smooth": True}, "smooth must be left out with live, got True"),
+        ({"person": 2}, "person must be left out with live, got 2"),
+        (
+            {"extraction": Extraction(person=2)},
+            "person must be left out with live, got 2",
+        ),
         (
             {"extraction": Extraction("median")},
             "extraction applies only to video, got .* for masks",

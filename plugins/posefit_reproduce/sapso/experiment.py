@@ -230,7 +230,7 @@ def first_history(
     }
     options |= {"evaluations": particles * (iterations + 1), "seed": run.seed}
     # figure 6 shows the first frame alone
-    frame = track(paper_scene(motion, run.view, (0, 1)), **options).frames[0]
+    frame = track(paper_scene(motion, run.view, 1), **options).frames[0]
     evaluations, costs = frame.trace.T
     populations = particles * np.arange(1, iterations + 2)
     history: Array = costs[np.searchsorted(evaluations, populations, "right") - 1]

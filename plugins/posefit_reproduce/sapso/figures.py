@@ -114,7 +114,7 @@ def watched_swarm(
     motion: PaperMotion, particles: int = SHOWN_PARTICLES, iterations: int = ITERATIONS
 ) -> WatchedSwarm:
     """Return the swarm of SAPSO in the first frame."""
-    scene = paper_scene(motion, SHOWN_VIEW, (0, 1))
+    scene = paper_scene(motion, SHOWN_VIEW, 1)
     options = completed(
         TrackOptions(**options_of(OURS, motion.training, iterations)), scene.truth
     )

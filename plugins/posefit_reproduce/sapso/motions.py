@@ -13,7 +13,6 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.footage.scene import Scene, synthetic
-from posefit.footage.views import Range
 from posefit.motion.clips import load_motion
 from posefit.motion.motion import Motion
 from posefit.sweep.cell import digest_of
@@ -92,8 +91,9 @@ def _clip(folder: str | Path | None, clip: str) -> Motion:
     return load_motion(Path(folder) / f"{clip}.amc", FPS)
 
 
-def paper_scene(
-    motion: PaperMotion, view: float, frames: Range = (None, None)
-) -> Scene:
-    """Return the scene of a motion, seen by a camera."""
-    return synthetic(motion.test, [view], SIZE, [], frames)
+def paper_scene(motion: PaperMotion, view: float, frames: int | None = None) -> Scene:
+    """Return the scene of a motion, or of its first frames, seen by a camera."""
+    test = motion.test
+    if frames is not None:
+        test = test.frames(0, frames)
+    return synthetic(test, [view], SIZE, [], (None, None))

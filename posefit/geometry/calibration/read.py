@@ -49,6 +49,15 @@ DIALECTS: tuple[Dialect, ...] = (
 MESSAGE = 300  # most characters of the reason in a message
 
 
+def file_and_name(path: str | Path) -> tuple[Path, str]:
+    """Return the file of a calibration, and the name after it in `FILE:NAME`, or ""."""
+    path = Path(path)
+    before, colon, name = str(path).rpartition(":")
+    if colon and not path.is_file():
+        return Path(before), name
+    return path, ""
+
+
 def read_calibrations(path: str | Path) -> list[Calibration]:
     """Return the cameras of a calibration file.
 
@@ -63,12 +72,7 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
             message names the file and the mistake.
 
     """
-    path = Path(path)
-    chosen = ""
-    before, colon, after = str(path).rpartition(":")
-    if colon and not path.is_file():
-        path = Path(before)
-        chosen = after
+    path, chosen = file_and_name(path)
     if not path.is_file():
         raise InputError(f"{path}: no such file")
     if path.suffix.lower() in PICKLES:
