@@ -1,10 +1,10 @@
 #!/bin/sh
 # bvhtoolbox 0.1.3: `bvh2csv --scale` scales a joint once for each joint above it, too.
 #
-# Each joint's place is worked out from its parent's, which is already scaled, and scaled again. With 0.01, for metres from
-# centimetres, the hips at (50, 92) come out at (0.5, 0.92), the knee below them, at (50, 52), at (0.005, -0.391), and the
-# ankle at (0.00005, -0.424): the hips alone are right. Convert without it, and multiply the table. (`scale` of
-# `bvhtoolbox.convert.bvh2csv` does the same.)
+# Each joint's place is worked out from its parent's, which is already scaled, and scaled again. With 0.01, for metres
+# from centimetres, the hips at (50, 92) come out at (0.5, 0.92), the knee below them, at (50, 52), at (0.005,
+# -0.391), and the ankle at (0.00005, -0.424): the hips alone are right. Convert without it, and multiply the table.
+# (`scale` of `bvhtoolbox.convert.bvh2csv` does the same.)
 #
 # Ends with 0 while it is so, and with 1 once it is not.
 set -eu

@@ -3,9 +3,9 @@
 #
 # The new frames are spread evenly from the first old frame to the last, but are as many as fill the old duration, so
 # that their times and their poses disagree. A second of a walk of 1.2 m/s, 120 frames, is 1.231 m/s at 30 frames a
-# second; thirty frames that are brought to 120 a second become 1.170 m/s, and twelve frames of 120 a second 1.650 m/s at
-# 30. The error is that of one frame, so that long clips hide it. For a whole ratio take every n-th of `motion.frames`;
-# else interpolate at k / fps.
+# second; thirty frames that are brought to 120 a second become 1.170 m/s, and twelve frames of 120 a second 1.650 m/s
+# at 30. The error is that of one frame, so that long clips hide it. For a whole ratio take every n-th of
+# `motion.frames`; else interpolate at k / fps.
 #
 # Ends with 0 while it is so, and with 1 once it is not.
 set -eu

@@ -1,10 +1,10 @@
 #!/bin/sh
 # camorph 1.0.0: of a COLMAP camera of the model FULL_OPENCV, k2 is lost, and k3 takes its place.
 #
-# COLMAP writes fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6. camorph takes k1 and goes on with k3, so that -0.25 0.1 0 0 0.02 ...
-# is written again, by itself, as -0.25 0.02 0 0 0 ..., and as k1 -0.25, k2 0.02 into NeRF's transforms.json. Half a
-# picture's width from the centre, where x is 0.8 of the focal length, that moves a point by 12 of 640 pixels. Cameras of
-# the model OPENCV keep their k2: use it where k3 to k6 are 0, or put the numbers into the written file.
+# COLMAP writes fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6. camorph takes k1 and goes on with k3, so that -0.25 0.1 0 0 0.02
+# ... is written again, by itself, as -0.25 0.02 0 0 0 ..., and as k1 -0.25, k2 0.02 into NeRF's transforms.json. Half
+# a picture's width from the centre, where x is 0.8 of the focal length, that moves a point by 12 of 640 pixels.
+# Cameras of the model OPENCV keep their k2: use it where k3 to k6 are 0, or put the numbers into the written file.
 #
 # Ends with 0 while it is so, and with 1 once it is not.
 set -eu

@@ -1,11 +1,11 @@
 #!/bin/sh
 # Indago 0.6.0: `optimize(seed=...)` does not repeat a run of GA.
 #
-# The seed goes to NumPy alone. GA draws its crossover masks with `bitarray.util.urandom`, from the operating system, and
-# the bit that it mutates with Python's `random`, so that two runs with one seed part after the first generation. PSO, DE,
-# CMAES and others repeat theirs to the last bit. `random.seed` does not help against urandom. Put a function that draws
-# from NumPy, such as the one at the end, in its place, and set `random.seed` before each run. (bitarray is needed and not
-# asked for.)
+# The seed goes to NumPy alone. GA draws its crossover masks with `bitarray.util.urandom`, from the operating system,
+# and the bit that it mutates with Python's `random`, so that two runs with one seed part after the first generation.
+# PSO, DE, CMAES and others repeat theirs to the last bit. `random.seed` does not help against urandom. Put a function
+# that draws from NumPy, such as the one at the end, in its place, and set `random.seed` before each run. (bitarray is
+# needed and not asked for.)
 #
 # Ends with 0 while it is so, and with 1 once it is not.
 set -eu

@@ -1,11 +1,11 @@
 #!/bin/sh
 # iohinspector 0.0.8: aggregate_running_time gives an expected running time (ERT) that is too low, or too high.
 #
-# Three runs of 20, 50 and 30 evaluations reach the target after 5, never, and after 10: 5 + 50 + 10 evaluations for two
-# successes are 32.5. As `load` leaves out what does not improve, the largest evaluation in the data is the 10 of the last
-# improvement, which counts as the budget of the run that failed: 12.5. With `monotonic=False` the last of several equal
-# values counts as the first hit, here the end of the run: 50. PAR-10 errs alike. Load monotonic data, and set `eval_max`
-# to the budget.
+# Three runs of 20, 50 and 30 evaluations reach the target after 5, never, and after 10: 5 + 50 + 10 evaluations for
+# two successes are 32.5. As `load` leaves out what does not improve, the largest evaluation in the data is the 10 of
+# the last improvement, which counts as the budget of the run that failed: 12.5. With `monotonic=False` the last of
+# several equal values counts as the first hit, here the end of the run: 50. PAR-10 errs alike. Load monotonic data,
+# and set `eval_max` to the budget.
 #
 # Ends with 0 while it is so, and with 1 once it is not.
 set -eu

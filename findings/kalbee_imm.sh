@@ -1,12 +1,12 @@
 #!/bin/sh
 # kalbee 1.0.0: InteractingMultipleModel gives other probabilities with four of its filters, for the same models.
 #
-# Between steps it sets the `state` and `covariance` of each filter, and takes the likelihood from `last_y` and `last_S`.
-# InformationFilter and EnsembleKalmanFilter have a state of their own, which stays as it was, and no `last_y`: the
-# likelihood of the first comes from the residual after the update, and that of the second is 1, so that no measurement
-# ever counts. CholeskyKalmanFilter and SquareRootUKF keep their own factors of the covariance. Of two models of constant
-# velocity, the one with much noise has 6 % at the end of a straight stretch with KalmanFilter, 4 % with
-# CholeskyKalmanFilter, 96 % with InformationFilter, and 50 % with the ensemble. Alone, these filters agree. Use
+# Between steps it sets the `state` and `covariance` of each filter, and takes the likelihood from `last_y` and
+# `last_S`. InformationFilter and EnsembleKalmanFilter have a state of their own, which stays as it was, and no
+# `last_y`: the likelihood of the first comes from the residual after the update, and that of the second is 1, so that
+# no measurement ever counts. CholeskyKalmanFilter and SquareRootUKF keep their own factors of the covariance. Of two
+# models of constant velocity, the one with much noise has 6 % at the end of a straight stretch with KalmanFilter, 4 %
+# with CholeskyKalmanFilter, 96 % with InformationFilter, and 50 % with the ensemble. Alone, these filters agree. Use
 # KalmanFilter, SquareRootKalmanFilter or UnscentedKalmanFilter.
 #
 # Ends with 0 while it is so, and with 1 once it is not.

@@ -1,10 +1,10 @@
 #!/bin/sh
 # kineticstoolkit 0.17.0: kinematics.write_trc_file states the frame rate times the number of frames.
 #
-# Twelve frames of 100 a second have a DataRate of 1200, and 120 frames one of 12000, in all three places of the header:
-# the number of frames is divided by the time between two. Times have three decimals, so that those of 119.88 frames a
-# second are 8 and 9 ms apart, and a reader that goes by them does not find the rate either. Put the rate into the third
-# line, or write with ktk.write_c3d, which keeps it.
+# Twelve frames of 100 a second have a DataRate of 1200, and 120 frames one of 12000, in all three places of the
+# header: the number of frames is divided by the time between two. Times have three decimals, so that those of 119.88
+# frames a second are 8 and 9 ms apart, and a reader that goes by them does not find the rate either. Put the rate
+# into the third line, or write with ktk.write_c3d, which keeps it.
 #
 # Ends with 0 while it is so, and with 1 once it is not.
 set -eu

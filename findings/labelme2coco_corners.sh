@@ -1,10 +1,11 @@
 #!/bin/sh
 # labelme2coco 0.2.6 with sahi 0.12.8: corners of polygons are cut to whole pixels, left and up.
 #
-# LabelMe stores where somebody clicked, to a fraction of a pixel. `convert` writes 10.9 as 10 and 30.4 as 30, so that a
-# mask moves by half a pixel to the left and up on average, here a square of 20 x 20 pixels by 0.9. The box, written
-# beside it, keeps its fractions. Polygons with one `group_id`, which LabelMe has for the parts of one person (its issues
-# 633 and 714), become one person each. Take the corners from LabelMe's files, in the same order of images and shapes.
+# LabelMe stores where somebody clicked, to a fraction of a pixel. `convert` writes 10.9 as 10 and 30.4 as 30, so that
+# a mask moves by half a pixel to the left and up on average, here a square of 20 x 20 pixels by 0.9. The box, written
+# beside it, keeps its fractions. Polygons with one `group_id`, which LabelMe has for the parts of one person (its
+# issues 633 and 714), become one person each. Take the corners from LabelMe's files, in the same order of images and
+# shapes.
 #
 # Ends with 0 while it is so, and with 1 once it is not.
 set -eu

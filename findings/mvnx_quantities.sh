@@ -1,10 +1,10 @@
 #!/bin/sh
 # mvnx 0.2: of an .mvnx file that has only some quantities, it returns one under the name of another.
 #
-# Who exports from Xsens MVN chooses the quantities. MVNX takes them by their place among all fourteen, not by the names
-# of the elements: in a file with orientation, position and jointAngle, `velocity` has the joint angles in degrees, and
-# `jointAngle` is empty. (Issue 1 says that the parser is for files with all quantities, and that others give an error;
-# they do not.) Export all of them, or set `mapping` and call `parse_modality`.
+# Who exports from Xsens MVN chooses the quantities. MVNX takes them by their place among all fourteen, not by the
+# names of the elements: in a file with orientation, position and jointAngle, `velocity` has the joint angles in
+# degrees, and `jointAngle` is empty. (Issue 1 says that the parser is for files with all quantities, and that others
+# give an error; they do not.) Export all of them, or set `mapping` and call `parse_modality`.
 #
 # Ends with 0 while it is so, and with 1 once it is not.
 set -eu

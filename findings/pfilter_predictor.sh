@@ -1,10 +1,11 @@
 #!/bin/sh
 # pfilter 0.2.5: ParticleFilter.copy loses the noise, so that `predictor` is as sure of the future as of now.
 #
-# `copy` passes on every function but `noise_fn`, though it promises an exact copy, and `predictor` runs such a copy ahead.
-# For a random walk that spreads by 1 a step, nine steps without observations give particles a standard deviation of 3.2
-# in the filter, and 1.0 in its copy and its predictor, that of the first step. The argument `observed` of `predictor` is
-# not used either. Set `noise_fn` of a copy, and update it yourself: `observed` in the first step, None afterwards.
+# `copy` passes on every function but `noise_fn`, though it promises an exact copy, and `predictor` runs such a copy
+# ahead. For a random walk that spreads by 1 a step, nine steps without observations give particles a standard
+# deviation of 3.2 in the filter, and 1.0 in its copy and its predictor, that of the first step. The argument
+# `observed` of `predictor` is not used either. Set `noise_fn` of a copy, and update it yourself: `observed` in the
+# first step, None afterwards.
 #
 # Ends with 0 while it is so, and with 1 once it is not.
 set -eu

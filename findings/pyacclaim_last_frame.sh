@@ -1,9 +1,9 @@
 #!/bin/sh
 # pyacclaim 0.0.1: loadAMC leaves out the last frame of an .amc file.
 #
-# A frame is kept when the number of the next one is read, and after the last there is none: three frames are read as two,
-# and a file of one frame as none, without a word. (AMCParser, another reader, did so until 2018, pull request 2.) Write
-# one more number, such as 4, as the last line.
+# A frame is kept when the number of the next one is read, and after the last there is none: three frames are read as
+# two, and a file of one frame as none, without a word. (AMCParser, another reader, did so until 2018, pull request
+# 2.) Write one more number, such as 4, as the last line.
 #
 # Ends with 0 while it is so, and with 1 once it is not.
 set -eu

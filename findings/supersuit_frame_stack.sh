@@ -1,11 +1,11 @@
 #!/bin/sh
 # SuperSuit 3.11.0: frame_stack_v2 of pictures along the first axis has no past, and all observations are one array.
 #
-# With `stack_dim=0`, grey pictures (H, W) are stacked as (4, H, W). The newest is written into the first three places,
-# and the last stays 0: 7, 7, 7, 0 after the seventh step, where 4, 5, 6, 7 belong. Along the last axis the order is
-# right. In all cases `reset` and `step` return the wrapper's own array, so that an observation that is kept changes with
-# the next step: in `add(observation, action, following)` both are the same. Use gymnasium's FrameStackObservation, or
-# stack along the last axis, move it, and copy.
+# With `stack_dim=0`, grey pictures (H, W) are stacked as (4, H, W). The newest is written into the first three
+# places, and the last stays 0: 7, 7, 7, 0 after the seventh step, where 4, 5, 6, 7 belong. Along the last axis the
+# order is right. In all cases `reset` and `step` return the wrapper's own array, so that an observation that is kept
+# changes with the next step: in `add(observation, action, following)` both are the same. Use gymnasium's
+# FrameStackObservation, or stack along the last axis, move it, and copy.
 #
 # Ends with 0 while it is so, and with 1 once it is not.
 set -eu

@@ -2,9 +2,9 @@
 # trc-data-reader 0.4.1: where a marker is missing from a row, the markers after it take its place.
 #
 # A .trc file leaves the three cells of a marker that was not seen empty, as Mokka and this library's own `save` do.
-# `load` splits rows at any white space, so that the empty cells vanish: without the hip, the knee's coordinates are the
-# hip's, the ankle's are the knee's, and the last marker is nan. A gap of the hip that is saved and read again moves the
-# whole leg. Split the rows at tabs, `line.split("\t")`, or write `nan` into empty cells.
+# `load` splits rows at any white space, so that the empty cells vanish: without the hip, the knee's coordinates are
+# the hip's, the ankle's are the knee's, and the last marker is nan. A gap of the hip that is saved and read again
+# moves the whole leg. Split the rows at tabs, `line.split("\t")`, or write `nan` into empty cells.
 #
 # Ends with 0 while it is so, and with 1 once it is not.
 set -eu
