@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import settings
 
@@ -15,6 +16,10 @@ settings.register_profile("posefit", deadline=None)
 settings.load_profile("posefit")
 # a run in the background ignores it, and so do its children
 signal.signal(signal.SIGINT, signal.default_int_handler)
+if os.environ.get("NUMBA_DISABLE_JIT") == "1":
+    # the rasteriser takes roots of negative numbers on purpose, and compiled code
+    # does not warn
+    np.seterr(invalid="ignore")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -405,9 +405,9 @@ class Problems:
     def count(self, rows: NDArray[np.int64], proposals: Array, costs: Array) -> None:
         """Count proposals (m, k, d) with costs (m, k) in rows (m,); keep the best."""
         self.evaluations[rows] += costs.shape[1]
-        least = costs.min(axis=1)
+        least = np.fmin.reduce(costs, axis=1)  # nan only if all are nan
         better = np.flatnonzero(least < self.best_costs[rows])
         if better.size:
-            lowest = costs[better].argmin(axis=1)
+            lowest = np.nanargmin(costs[better], axis=1)
             self.best_costs[rows[better]] = least[better]
             self.best[rows[better]] = proposals[better, lowest]

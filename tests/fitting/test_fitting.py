@@ -10,6 +10,7 @@ from posefit import (
     Body,
     Camera,
     Problem,
+    Problems,
     SearchSpace,
     Silhouette,
     SilhouetteCost,
@@ -426,3 +427,17 @@ def test_a_cost_function_that_works_in_place_changes_nobodys_proposals() -> None
 def test_proposals_are_real_numbers() -> None:
     with pytest.raises(ValueError, match="must be real, got complex"):
         Problem(lambda x: x[:, 0], LINE)(np.array([[0.5j]]))
+
+
+@each("costs", [[3.0, np.nan, 2.0], [np.nan] * 3, [np.inf, 1.0, 1.0]])
+def test_rows_of_problems_count_like_a_problem(costs: list[float]) -> None:
+    proposals = np.linspace(-0.5, 0.5, 6).reshape(3, 2)
+    alone = Problem(lambda _: np.array(costs), Toy(2))
+    together = Problems(2, 2)
+    alone(proposals)
+    together.count(np.array([1]), proposals[None], np.array([costs]))
+
+    assert together.evaluations.tolist() == [0, alone.evaluations]
+    assert together.best_costs.tolist() == [np.inf, alone.best_cost]
+    if np.isfinite(alone.best_cost):
+        assert together.best[1].tolist() == alone.best.tolist()
