@@ -429,8 +429,8 @@ def table(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         "seeds",
         "cost",
         "95 % interval",
-        "as SAPSO",
-        "as CMA-ES",
+        "evaluations of SAPSO",
+        "of CMA-ES",
     ]
     yield from markdown(heads, cells)
 

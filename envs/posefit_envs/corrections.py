@@ -24,7 +24,7 @@ Features = NDArray[np.float32]
 BLOCK = 4
 # reach of a correction, in half-ranges of the box; the first proposal reaches all of it
 REACH = 0.3
-# after as many corrections in vain an agent sees no difference any more
+# an observation counts at most this many corrections since the best proposal
 MOST_FAILURES = 4
 
 

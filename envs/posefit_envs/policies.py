@@ -111,9 +111,9 @@ def rollout(
 def race_features(observation: Any) -> tuple[Array, Array]:
     """Return the features (..., k, 4) of k searches, and the common ones (..., 3).
 
-    They are read from observations (..., 4 k + 3) of Race-v1. A search has best cost,
-    slope, spread and share of the budget used. In common are best cost, budget left and
-    budget.
+    They are read from observations (..., 4 k + 3) of Race-v1. The features of a
+    search are its best cost, slope, spread and share of the budget used. The common
+    features are the best cost of all, the budget left and the budget.
     """
     shown = np.asarray(observation, dtype=np.float64)
     each = shown[..., :-COMMON_FEATURES]

@@ -51,7 +51,7 @@ WRONG_YAW_COST = 4.0
 
 # The hypotheses' costs.
 
-# Silhouettes cost this times as much as on the path, because fitted poses are nearer.
+# Silhouettes cost this many times as much as on the path: fitted poses are nearer.
 SHARPNESS = 2.0
 STEP_SPREAD = 4.0 / 3.0  # times the spread of the path's steps
 # A distance from the clips of d LIBRARY_DISTANCE costs LIBRARY_COST log(1 + d^2 / 2).
@@ -325,8 +325,8 @@ class HypothesisCosts:
     ) -> Array:
         """Return the costs (n, m) of steps to the m hypotheses of a frame.
 
-        A step costs the more, the farther the joints are from where the motion of the
-        hypothesis leads. The same holds for the root if it is unknown.
+        The cost grows with the distance of the joints from where the motion of the
+        hypothesis leads, and with that of the root if it is unknown.
         """
         costs = motion_step_costs(self._spread, before, after)
         if frame_costs.root is None:

@@ -178,7 +178,8 @@ def straightened(camera: Camera, silhouette: Silhouette) -> tuple[Mask, float, f
     elevation = float(np.arcsin(-y))
     straight = looking_at(azimuth, elevation)
     half = float(np.arccos(np.clip(rays @ ray, -1.0, 1.0)).max())
-    # 5 % of margin; the limit keeps the tangent finite for a person all around
+    # 5 % of margin; the limit keeps the tangent finite if the person is so close that
+    # they fill half of the camera's surroundings
     focal = 0.5 * PICTURE / np.tan(min(1.05 * half, 1.2))
     to_picture = pinhole_matrix([focal, focal], [PICTURE / 2.0, PICTURE / 2.0])
     from_image = np.linalg.inv(pinhole_matrix(camera.focal, camera.centre))

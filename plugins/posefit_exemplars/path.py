@@ -54,7 +54,7 @@ from posefit_exemplars.proposals import (
 )
 
 FULL_SHARE = 0.6  # share of the path's evaluations for costs at full size
-SEARCHES_PER_SECOND = 10.0  # searches everywhere
+SEARCHES_PER_SECOND = 10.0  # of searches among states from anywhere
 
 
 class _PathFrame(NamedTuple):

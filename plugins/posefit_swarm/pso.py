@@ -34,7 +34,7 @@ class PSO:
         population_size: size of the swarm, 1 or more.
         phi (phi): sum of the two accelerations, above 4. Clerc and Kennedy 2002.
         alpha (alpha): velocity limit as a share of each coordinate's half-range, above
-            0. As SAPSO.
+            0. As in SAPSO.
     """
 
     def __init__(

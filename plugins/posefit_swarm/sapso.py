@@ -1,9 +1,9 @@
 """Simulated-annealed particle swarm optimisation, Algorithm 1, as ask and tell.
 
-Li, Sun, Chen and Li (2012). Attributes have the paper's letters. Comments such as
-SAPSO (1) mark its equations. Where the paper is silent, an Interpretation is named: see
-docs/background/interpretations.md. `posefit_reproduce.sapso.letter` follows the paper's
-letter.
+Li, Sun, Chen and Li (2012). Attributes are named by the paper's symbols. Comments
+such as SAPSO (1) mark its equations. Where the paper is silent, an Interpretation is
+named: see docs/background/interpretations.md. `posefit_reproduce.sapso.letter` follows
+the paper's letter.
 """
 
 import math
@@ -25,8 +25,8 @@ from posefit.plugin import (
     wrap,
 )
 
-# ours: how many further steps are drawn if the prior refuses one; after these the
-# particle does not move. Interpretation S7
+# ours: how many more steps are drawn if the prior refuses the first; if it refuses all
+# of them, the particle does not move. Interpretation S7
 REDRAWS = 10
 
 Rows = NDArray[np.int64]
@@ -39,13 +39,13 @@ class SAPSO:
         population_size (N): size of the swarm, 1 or more. Section 5.2.
         iterations (C): number of moves, 1 or more; they follow one evaluation of
             the first positions (Interpretation S10). Section 5.2.
-        temperature (T): first temperature of the annealing, above 0, in units of
+        temperature (T): initial temperature of the annealing, above 0, in units of
             the cost. Section 5.2.
         cooling (gamma): factor on the temperature after each iteration
             (Interpretation S6), 0 to 1. Section 5.2.
-        stop_temperature (T0): the search ends at or below it, 0 or more; 0 never
-            ends it. Interpretation S5.
-        inertia (A): first factor on the old velocity, above 0.1; it falls towards
+        stop_temperature (T0): the search ends when the temperature falls to it, 0 or
+            more; at 0 only the iterations end the search. Interpretation S5.
+        inertia (A): initial factor on the old velocity, above 0.1; it falls towards
             0.1. Section 3.1, Interpretation S5.
         acceleration (c1, c2): factor on the pulls towards the personal best and the
             swarm's best, 0 or more. Section 3.1.
@@ -77,17 +77,17 @@ class SAPSO:
         positive("alpha", alpha)
         self.space = space
         self.rng = rng
+        # c counts iterations; what the paper calls c is c ln(10 A) / C
         self.c = 0
         self.C = iterations
-        self.waiting = 0
+        self.waiting = 0  # proposals that wait for their costs
         self.T = temperature
         self.gamma = cooling
         self.T0 = stop_temperature
         self.A = inertia
         self.acceleration = acceleration
         self.alpha = alpha
-        # the positions to be evaluated next; c counts iterations, while the paper's own
-        # c is c ln(10 A) / C
+        # the positions to be evaluated next
         self.moved = draw_population(space, rng, population_size)  # SAPSO A1.1
         self.x = self.moved.copy()
         self.cost = np.full(population_size, np.inf)
@@ -136,7 +136,7 @@ class SAPSO:
         return int(accepted.sum())
 
     def inertia(self) -> float:
-        """Return omega of this iteration."""
+        """Return the inertia omega of this iteration."""
         return inertia_at(self.c, self.C, self.A)
 
     def step(self, rows: Rows) -> tuple[Array, Array]:
@@ -153,7 +153,10 @@ class SAPSO:
 
 
 def inertia_at(c: int, C: int, A: float) -> float:
-    """Return omega of iteration c of C: it falls from A towards 0.1. Section 3.1."""
+    """Return the inertia omega of iteration c of C.
+
+    It falls from A towards 0.1. Section 3.1.
+    """
     return A / math.exp(c * math.log(10.0 * A) / C)  # SAPSO inertia
 
 
@@ -168,12 +171,12 @@ def limited(v: Array, alpha: float) -> Array:
 def first_velocities(
     space: Space, rng: np.random.Generator, count: int, alpha: float
 ) -> Array:
-    """Return the velocities (count, d) of first particles.
+    """Return the initial velocities (count, d) of particles.
 
     They point towards the prediction if the space has one.
     """
     if space.start is None:
-        # ours: the paper does not give first velocities
+        # ours: the paper does not give velocities without a prediction
         return rng.uniform(-alpha, alpha, (count, space.dimensions))
     v_pred = space.start.velocity
     # Interpretation S12
@@ -186,7 +189,8 @@ def first_velocities(
 def fly(space: Space, x: Array, v: Array) -> tuple[Array, Array]:
     """Return velocities and positions (n, d) of particles after a step from x (n, d).
 
-    The walls of the box stop them. Constraint 1.
+    A coordinate that would leave the box stops at its side, with velocity 0.
+    Constraint 1.
     """
     there = wrap(space, x + v)  # SAPSO (2)
     inside = np.minimum(np.maximum(there, -1.0), 1.0)
@@ -203,8 +207,8 @@ def redrawn(
 
     If a particle's step is not allowed, `redraws` further steps are drawn in one call,
     and the first allowed one is taken. If none is allowed, the particle does not move
-    and its velocity is 0. Interpretation S7. The paper's letter limits velocities as
-    well.
+    and its velocity is 0. Interpretation S7. In the paper's letter, `allowed` checks
+    the limits of velocities as well.
 
     Args:
         x: Positions (n, d).

@@ -2,7 +2,7 @@
 
 A build is searched by trying bodies. One call per body and frame would fill one lane of
 the kernel and leave the others empty, and spend more time in Python than in the kernel.
-Each pair of a body and a frame has the same bits as alone.
+Each pair of a body and a frame has the same cost, bit for bit, as alone.
 """
 
 from collections.abc import Iterable, Sequence

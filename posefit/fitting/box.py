@@ -62,7 +62,7 @@ class Space(Protocol):
 
     @property
     def dimensions(self) -> int:
-        """d."""
+        """The dimension d of the box."""
         ...
 
     @property
@@ -126,7 +126,7 @@ def displacement(space: Space, origin: Array, target: Array) -> Array:
 
 
 def converted(space: Space, proposals: Array, origin: Space) -> Array:
-    """Return the proposals (n, d) in `space` with the same poses as these in `origin`.
+    """Return the proposals (n, d) in `space` for the poses of `proposals` in `origin`.
 
     A `Filter` needs it in `advance`, where `origin` is the space of the frame before. A
     space without a method `moved` is the same box in every frame.

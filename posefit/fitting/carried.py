@@ -1,6 +1,6 @@
 """The state of a filter as plain values, with which an interrupted track continues.
 
-Numbers, texts, arrays, and lists and mappings of them are kept. The tracker knows the
+Numbers, strings, arrays, and lists and mappings of them are kept. The tracker knows the
 filter's space and its generator. A filter with any other attribute starts over when a
 track is resumed.
 """

@@ -217,8 +217,8 @@ class CMAES:
     Settings:
         population_size (lambda): 5 or more, or 0 for 4 + 3 ln d, at least 5. Hansen
             2016.
-        spread (sigma): the first step size without a prediction, in half-ranges of the
-            box, above 0. Ours.
+        spread (sigma): the initial step size without a prediction, in half-ranges of
+            the box, above 0. Ours.
     """
 
     def __init__(

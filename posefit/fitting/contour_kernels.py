@@ -118,8 +118,8 @@ class Cone(NamedTuple):
     axis_x: float  # direction to the centre of the last disc
     axis_y: float
     length: float  # distance between both centres
-    taper: float  # how much less the last radius is
-    tangent: float  # of the angle that the sides have with the axis
+    taper: float  # the first radius minus the last
+    tangent: float  # of the angle between the sides and the axis
     inverse: float  # 1 over the length, or 0 if one disc covers the other
 
 

@@ -55,9 +55,9 @@ def minimise(
     """Minimise a problem with an optimiser, and return the problem.
 
     The search ends when the optimiser proposes nothing, or when its next population
-    exceeds the rest of the budget; this population is not evaluated. If the optimiser
-    stops before half of the budget is used, a warning is given, because its schedule
-    may not know the budget. `budget_known` says that it does.
+    is larger than what is left of the budget; that population is not evaluated. If the
+    optimiser stops before half of the budget is used, a warning is given, because its
+    schedule may not know the budget. `budget_known` says that it does.
 
     Args:
         problem: what to minimise; it must have a budget.
@@ -120,18 +120,18 @@ class Problem:
     float. Every proposal counts as one evaluation, whether it is feasible or not.
 
     A problem also has the attributes of its cost function, such as `problem.decode` in
-    a frame and `problem.look` in a suite. Attributes that COCO's problems have, too,
-    have the same names here.
+    a frame and `problem.look` in a suite. Where COCO's problems have the same
+    attribute, it has COCO's name.
 
     Args:
         cost: returns the costs (n,) of proposals (n, d).
-        space: the box, as an optimiser knows it.
+        space: the box that an optimiser searches.
         budget: the largest number of evaluations; None for any number.
         repair: moves infeasible proposals (n, d) before they are evaluated; by default
             they are not moved.
-        noisy: returns the noisy costs (n,) that a call returns, from the proposals
-            (n, d) and the number of evaluations before them. By default a call returns
-            `cost`. The best and the trace are always of `cost`.
+        noisy: takes proposals (n, d) and the number of evaluations before them, and
+            returns the costs (n,) that the optimiser gets; by default these are the
+            costs without noise. The best and the trace are always without noise.
         targets: costs to be reached, in descending order.
         id: names the problem in messages.
 
@@ -171,7 +171,7 @@ class Problem:
         self.budget = budget
         self.targets = np.empty(0) if targets is None else targets
         self.id = id
-        self.index = 0  # in a suite
+        self.index = 0  # the problem's place in a suite
         self._repair = repair
         self._noisy = noisy
         self.reset()
@@ -180,14 +180,14 @@ class Problem:
         """Forget all evaluations: the count, the best and the trace."""
         self.evaluations = 0
         self.best_cost = np.inf
-        # each fall of the cost: evaluations so far, the cost, and the proposal (d,)
-        self._falls: list[tuple[int, float, Array]] = []
+        # each improvement: evaluations so far, the cost, and the proposal (d,)
+        self._improvements: list[tuple[int, float, Array]] = []
 
     def __call__(self, proposals: Any) -> Any:
         """Return the costs (n,) of proposals (n, d), or the cost of one proposal (d,).
 
-        Arrays may be of any library that has DLPack; the costs come as an array of the
-        same library.
+        Proposals may be an array of any library that supports DLPack; the costs are
+        returned as an array of the same library.
 
         Raises:
             ValueError: the shape is wrong, or a number is not finite. Nothing is
@@ -206,7 +206,8 @@ class Problem:
             )
         if self._repair is not None:
             rows = self._repair(rows)
-        # a copy, because a cost function that works in place would change the record
+        # a copy, because a cost function that works in place would change the proposals
+        # that are recorded
         costs = self.cost(rows.copy())
         if not isinstance(costs, np.ndarray) or costs.shape != (len(rows),):
             came = getattr(costs, "shape", type(costs).__name__)
@@ -232,7 +233,7 @@ class Problem:
             if costs[k] < self.best_cost:
                 self.best_cost = float(costs[k])
                 used = self.evaluations + int(k) + 1
-                self._falls.append((used, self.best_cost, rows[k].copy()))
+                self._improvements.append((used, self.best_cost, rows[k].copy()))
         self.evaluations += len(rows)
 
     def checked(self, proposals: object) -> Array:
@@ -272,27 +273,28 @@ class Problem:
             ValueError: no proposal has a finite cost yet.
 
         """
-        if not self._falls:
+        if not self._improvements:
             raise InputError(
                 f"{self.id} must have a finite cost before it has a best proposal,"
                 f" got none in {self.evaluations} evaluations"
             )
-        return self._falls[-1][2].copy()
+        return self._improvements[-1][2].copy()
 
     @property
     def points(self) -> Array:
-        """The proposals (k, d) at which the cost fell, as they were evaluated."""
-        points = [point for _, _, point in self._falls]
+        """The proposals (k, d) that improved the best cost, as they were evaluated."""
+        points = [point for _, _, point in self._improvements]
         return np.array(points).reshape(-1, self.dimension)
 
     @property
     def trace(self) -> tuple[Array, Array]:
-        """The evaluations (k,) at which the cost fell, and the best cost (k,) at each.
+        """The evaluations (k,) at which the best improved, and the best costs (k,).
 
-        The last evaluation is added. The trace begins with the first finite cost.
+        The trace begins with the first finite cost, and ends with the last evaluation,
+        even if that improved nothing.
         """
-        used = [float(used) for used, _, _ in self._falls]
-        costs = [cost for _, cost, _ in self._falls]
+        used = [float(used) for used, _, _ in self._improvements]
+        costs = [cost for _, cost, _ in self._improvements]
         if used and used[-1] < self.evaluations:
             used.append(float(self.evaluations))
             costs.append(costs[-1])
@@ -300,22 +302,22 @@ class Problem:
 
     @property
     def dimension(self) -> int:
-        """d."""
+        """The dimension d of the box."""
         return self.space.dimensions
 
     @property
     def lower_bounds(self) -> Array:
-        """-1 (d,)."""
+        """The lower bounds (d,) of the box, all -1."""
         return np.full(self.dimension, -1.0)
 
     @property
     def upper_bounds(self) -> Array:
-        """1 (d,)."""
+        """The upper bounds (d,) of the box, all 1."""
         return np.ones(self.dimension)
 
     @property
     def best_observed_fvalue1(self) -> float:
-        """COCO's name of `best_cost`."""
+        """COCO's name for `best_cost`."""
         return self.best_cost
 
     @property
@@ -349,7 +351,9 @@ class Problem:
     def __copy__(self) -> "Problem":
         """Return an independent problem with the same count, best and trace."""
         twin: Problem = object.__new__(Problem)
-        twin.__dict__.update(self.__dict__, cost=copy(self.cost), _falls=[*self._falls])
+        twin.__dict__.update(
+            self.__dict__, cost=copy(self.cost), _improvements=[*self._improvements]
+        )
         return twin
 
     def __deepcopy__(self, memo: object) -> "Problem":
@@ -358,8 +362,8 @@ class Problem:
     def __getstate__(self) -> Any:
         raise PicklingError(
             f"{self.id} counts evaluations in its own process and cannot be sent to"
-            " another: make it there, as with posefit.suite, or give it whole"
-            " populations, in one process"
+            " another: make it there, as with posefit.suite, or keep it in one"
+            " process and evaluate whole populations with each call"
         )
 
     def __repr__(self) -> str:

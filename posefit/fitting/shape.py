@@ -50,10 +50,11 @@ NAMES = (
 # How much adults differ: standard deviations and correlations of the logarithms of
 # lengths over stature. They are computed from the public data of ANSUR II (Gordon et
 # al. 2014, NATICK/TR-15/007), 4082 men and 1986 women, with equal weight of both sexes.
-# Measures: thighs trochanterion to lateral femoral epicondyle, shanks from there to the
-# lateral malleolus, feet foot length, torso trochanterion to cervicale, neck cervicale
-# to the crown, shoulders biacromial breadth, upper arms acromion to radiale, forearms
-# radiale to stylion and the hand. ANSUR II does not measure the distance of the hip
+# The measures are: for thighs, trochanterion to lateral femoral epicondyle; for shanks,
+# from there to the lateral malleolus; for feet, foot length; for the torso,
+# trochanterion to cervicale; for the neck, cervicale to the crown; for shoulders,
+# biacromial breadth; for upper arms, acromion to radiale; for forearms, radiale to
+# stylion and the hand. ANSUR II does not measure the distance of the hip
 # joints, so its spread is ours. So are the spreads of girths, which are wide because
 # clothes count, and of scale, which is wider than the 0.054 of adults.
 PROPORTIONS_SPREAD = {

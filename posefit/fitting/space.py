@@ -200,5 +200,5 @@ class SearchSpace:
         return np.asarray(allowed & (np.abs(proposals) <= 1.0).all(axis=1))
 
     def moved(self, proposals: Array, origin: "SearchSpace") -> Array:
-        """Return the proposals (n, d) nearest to the poses of these in `origin`."""
+        """Return the proposals (n, d) nearest to the poses of those in `origin`."""
         return self.proposals(origin.centre + origin.half * proposals)

@@ -31,7 +31,7 @@ MIN_SMALL_SIDE = 40
 MAX_FACTOR = 4
 TEMPERATURE = 2.0  # divides the costs in the small picture
 INFEASIBLE_COST = 5.0  # added to the cost of a pose that the prior does not allow
-# Errors of the right one of several searched poses.
+# If several poses were searched: the errors that the right one still has.
 JOINT_ERROR = 0.06  # metres along an axis
 ANGLE_ERROR = 0.25  # radians
 

@@ -338,7 +338,7 @@ class Prediction:
     variant: Literal["default", "paper"] = "default"
 
     def __post_init__(self) -> None:
-        # 1 is 1.0, to compiled loops and in a summary
+        # so that 1 and 1.0 are the same to compiled loops and in a summary
         object.__setattr__(self, "beta", float(self.beta))
         choices(Prediction, vars(self))
         one_of("tilt", self.tilt or "learned", ("learned", "box"))

@@ -1,4 +1,4 @@
-"""Weights of costs, their effective sample size, resampling, and probabilities."""
+"""Weights from costs, their effective sample size, resampling, and probabilities."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +41,8 @@ def weigh(costs: Array, sharpness: float) -> Array:
 def effective_sample_size(weights: Array) -> float:
     """Return the effective number of samples of weights (n,), which sum to 1.
 
-    It is 1 over the sum of their squares: n if all are equal, 1 if one is all.
+    It is 1 over the sum of their squares: n if all weights are equal, and 1 if a single
+    weight is 1.
 
     Args:
         weights: The weights (n,).

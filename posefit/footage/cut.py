@@ -86,7 +86,7 @@ def _is_whole(blobs: Sequence[Person]) -> bool:
 
 
 def _others_move(image: Image, person: Person, then: Image, earlier: Person) -> bool:
-    """Return whether as much moves far from the person as another one would.
+    """Return whether so much moves far from the person that it may be another one.
 
     A network may report the person who is cut while another is whole.
     """

@@ -11,7 +11,7 @@ from posefit.arrays import Array
 from posefit.evaluation.measures import Measure
 from posefit.reading import counted
 
-MIN_P = 0.001  # texts only say that a p is lower
+MIN_P = 0.001  # a lower p is shown as `p < 0.001`
 MAX_NAMES = 4  # in a sentence, which counts the others
 _SYMBOLS = {"degrees": "°"}  # short forms of units, for titles of columns
 

@@ -12,7 +12,7 @@ from posefit.statistics.profiles import Trace
 
 
 class Stored(Protocol):
-    """Values that are made when they are asked for. A sequence is one, too."""
+    """Values that are made when they are read. Any sequence fits this protocol."""
 
     def __getitem__(self, k: int, /) -> Any: ...
 
@@ -20,7 +20,7 @@ class Stored(Protocol):
 
 
 class Store(Stored, Protocol):
-    """Values in the order in which they are added. A list is one, too."""
+    """Values in the order in which they are added. Any list fits this protocol."""
 
     def append(self, value: Any, /) -> None:
         """Add a value."""

@@ -37,7 +37,8 @@ INFEASIBLE: tuple[Infeasible, ...] = ("repair", "reject", "penalise")
 
 # above the true pose's cost, from 32 to 0.25; a pixel costs about 0.03
 TARGETS = 2.0 ** np.arange(5.0, -2.25, -0.25)
-# of a penalised proposal, for each half-side of the box from its repaired one
+# added to the cost for each half-range of the box between a penalised proposal and the
+# repaired one
 PENALTY = 100.0
 EVALUATIONS = 100  # the default budget per dimension
 
@@ -54,7 +55,7 @@ class SuiteCost:
 
     - "repair": the cost of the proposal that `repaired` returns for it
     - "reject": infinite
-    - "penalise": the cost of the repaired proposal, plus 100 for each half-side of the
+    - "penalise": the cost of the repaired proposal, plus 100 for each half-range of the
       box between the two
 
     Args:

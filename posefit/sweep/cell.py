@@ -36,7 +36,7 @@ class Cell:
         settings: The method's settings by name.
         evaluations: The budget: of a frame, or of a search.
         instance: The number of the variation of the motion or the function.
-        seed: Of everything random.
+        seed: The seed of all random numbers.
         name: The method's name in reports. It changes neither the result nor the key.
         version: The versions of posefit and of the method's plugins, with digests of
             their sources, as `posefit.registry.version_of` returns them.
@@ -122,7 +122,7 @@ class TrackCell(Cell):
             motion's name.
         body_off_percent: The largest error of each bone's length and radii that the
             method gets. It depends on the same two.
-        seed: Of everything random.
+        seed: The seed of all random numbers.
         name: The method's name in reports.
         files: The SHA-256 of each motion file that is read, by path.
         version: The versions of posefit and of the method's plugins.
@@ -236,7 +236,7 @@ class SearchCell(Cell):
         evaluations: The budget of the search.
         settings: The optimiser's settings by name.
         infeasible: The treatment of proposals outside the limits of a person.
-        seed: Of everything random.
+        seed: The seed of all random numbers.
         name: The optimiser's name in reports.
         version: The versions of posefit and of the optimiser's plugin.
     """

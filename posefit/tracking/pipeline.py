@@ -145,7 +145,7 @@ def track_scene(
         task = started.task
         scene = replace(given, body=task.body, cameras=task.cameras)
         effort = started.effort
-        # the search before the first frame is in no row of the audit
+        # the audit covers the track, not the search before its first frame
         method.audit.clear()
         with progress.phase("track"):
             hypotheses = track_hypotheses(

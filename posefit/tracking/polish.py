@@ -1,4 +1,4 @@
-"""Polishing of a single frame: its open poses are fitted to the contours of the masks.
+"""Polishing of a single frame: its likely poses fitted to the masks' contours.
 
 A search moves a pose only as its prior allows. Here every joint may move, as in the
 smoothing of a track. The cheapest polished pose is reported, and the costs of the
@@ -56,7 +56,7 @@ def _library(fps: float) -> list[Motion]:
 def looked_up(task: Task, observation: Observation) -> tuple[list[Posterior], int]:
     """Return likely poses of a picture, and the evaluations of the look-up.
 
-    The likeliest pose is first. A prior of built-in walks knows nothing else, but
+    The likeliest pose is first. A prior of built-in walks represents only walks, but
     people do more than walk. So if all training motions are built-in, poses are looked
     up in the library.
     """
@@ -77,7 +77,7 @@ def polished(
 
     Args:
         task: The task of the search.
-        frame: The result of the search, with a posterior if several poses are open.
+        frame: The result of the search, with a posterior if several poses are likely.
         observation: The masks.
         evaluations: The number of evaluations, from `polish_evaluations`.
         beta: The weight `beta` of the cost.
@@ -95,7 +95,7 @@ def polished(
     modes, looking = looked_up(task, observation)
     count = race_count(evaluations - looking)
     modes = modes[: count // 2]
-    poses, places = _open_poses(task, frame, observation)
+    poses, places = _likely_poses(task, frame, observation)
     poses = np.concatenate([*(mode.poses[:1] for mode in modes), poses])[:count]
     places = np.concatenate([*(mode.translations[:1] for mode in modes), places])
     places = places[:count]
@@ -151,10 +151,10 @@ def with_one_mode(frame: Frame) -> Frame:
     return replace(frame, posterior=posterior)
 
 
-def _open_poses(
+def _likely_poses(
     task: Task, frame: Frame, observation: Observation
 ) -> tuple[Array, Array]:
-    """Return the open poses of a search, and others with nearly the same silhouette.
+    """Return the likely poses of a search, and others with nearly the same silhouette.
 
     One camera hardly shows whether a person leans towards it or away, and which leg is
     in front.

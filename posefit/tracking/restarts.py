@@ -59,13 +59,13 @@ TRIAL_STRIDE = 3
 TRIAL_ROWS = 240  # pictures that compare restarts have at least this many rows
 WALKED = 0.3  # metres; a person who moves this far in the trial walks
 BACKWARDS_PENALTY = 1.1  # factor on the cost of a restart that walks backwards
-COST_RISE = 1.5  # a cost is high above this many times the typical cost of the track
-TYPICAL_COST_SECONDS = 1.0  # at least, of frames that give the typical cost
+COST_RISE = 1.5  # a cost above this multiple of the track's typical cost is high
+TYPICAL_COST_SECONDS = 1.0  # the typical cost is a median over at least this time
 HIGH_COST_SECONDS = 0.5  # a track relocalises after high costs for this long
 # Key in the details of a frame that relocalised: whether a restart was better.
 RELOCALISED = "relocalised"
-# If the track without spins costs more than this factor, it is wrong: the person really
-# turns that fast.
+# If removing the spins raises the cost of the track by this factor or more, the new
+# track is wrong: the person really turns that fast.
 SPIN_TOLERANCE = 1.5
 # Radians a second: the fastest turn of a person on the spot.
 MAX_TURN_RATE = np.radians(450.0)
@@ -74,7 +74,7 @@ SPIN_SECONDS = 0.1
 SPIN_ANGLE = np.radians(60.0)
 END_SECONDS = 0.5  # the run without spins is cut at most this far from its ends
 VOTES_PER_SECOND = 30.0
-# Votes that each radian costs by which a turn is faster than a person's.
+# The penalty on a turn faster than a person's, in votes for each radian in excess.
 EXCESS_TURN_VOTES = 30.0
 SEARCHED = "searched"
 SEARCHED_AGAIN = "searched again"

@@ -28,9 +28,9 @@ class LetterSAPSO(SAPSO):
         population_size (N): size of the swarm, 1 or more. Section 5.2.
         iterations (C): number of evaluated populations, 1 or more. Section 5.2,
             Interpretation S10.
-        stop_temperature (T0): the search ends at or below it, 0 or more; 0 never ends
-            it. Interpretation S5.
-        inertia (A): first factor on the old velocity, above 0.1; it falls to 0.1.
+        stop_temperature (T0): the search ends when the temperature falls to it, 0 or
+            more; at 0 only the iterations end the search. Interpretation S5.
+        inertia (A): initial factor on the old velocity, above 0.1; it falls to 0.1.
             Section 3.1, Interpretation S5.
     """
 

@@ -33,8 +33,8 @@ ROUNDS = 3  # at most; the exchanges of a round show what else is doubtful
 TRIAL_SECONDS = 0.3  # length of a trial before and after its frame
 # A wrong exchange raises the costs of frames for this time before and after it.
 DOUBT_SECONDS = 0.1
-# Metres, rms. Legs may have to be exchanged if, exchanged, they are this near to the
-# legs of the frame before.
+# Metres, rms. An exchange is considered if the exchanged legs are this near to the legs
+# of the frame before.
 PASSING = 0.16
 # The same if a smoothed frame costs more than all around it, and more than HIGH_COST
 # times the median.

@@ -2,7 +2,7 @@
 
 Each frame pulls the root to its estimate, weighted by how well that is known.
 Accelerations have a cost, and so do the steps of standing feet; the legs give way a
-little to keep these still.
+little to keep the feet still.
 """
 
 from collections.abc import Sequence

@@ -3,8 +3,8 @@
 A silhouette does not show how far a leg reaches towards the camera, so that the
 tracker bends knees as the people of the library do. They seem to stand with bent knees,
 because bones of recorded skeletons are a little too long for the distance from hip to
-ankle (docs/measured/footage.md). If straighter legs, with the person as much farther
-away, explain the masks as well, the person stands on these.
+ankle (docs/measured/footage.md). If straighter legs explain the masks as well, once
+the person is moved away from the camera to match, they are kept.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ from posefit.tracking.smoothing.path import Visibility, standing_feet
 from posefit.tracking.smoothing.smooth import Smoothed, moved, smooth
 from posefit.tracking.trajectory import mean_cost
 
-# A foot stands for longer than in a walk, where it does for 0.6 to 0.7 seconds.
+# Longer than a foot stands in a walk, which is 0.6 to 0.7 seconds.
 STANDING_SECONDS = 0.8
 # How much nearer the ankle is to the hip in the library than in people who stand, as a
 # share: half of its people stand with knees bent by 28 degrees or more
