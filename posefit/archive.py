@@ -92,7 +92,7 @@ def mapped(path: Path) -> NDArray[Any]:
     """Return the array of an .npy file, read from the disk row by row.
 
     Raises:
-        InputError: the file is not a valid .npy file.
+        InputError: The file is not a valid .npy file.
     """
     check_size(path, sys.maxsize)
     with _as_input_error(f"{path}: expected an .npy file with an array"):
@@ -108,15 +108,15 @@ def archived(
     """Yield the arrays of an .npz file by name, not unpacked yet.
 
     Args:
-        path: the file.
-        names: the arrays to look for; others are ignored.
-        what: description of the expected arrays, for messages.
-        packed: most bytes that the file may have.
-        single: if the file has only one array, take it for the first of the names,
+        path: The file.
+        names: The arrays to look for; others are ignored.
+        what: Description of the expected arrays, for messages.
+        packed: Most bytes that the file may have.
+        single: If the file has only one array, take it for the first of the names,
             which is needed.
 
     Raises:
-        InputError: the file is damaged or too large, or has several arrays and none of
+        InputError: The file is damaged or too large, or has several arrays and none of
             the first name. It may also be raised when an array is unpacked.
     """
     check_size(path, packed)
@@ -195,9 +195,9 @@ def _header(
     """Return an array's shape, order and type, and where its values begin.
 
     Args:
-        file: the array's file.
-        name: of the array, for messages.
-        size: bytes of the file.
+        file: The array's file.
+        name: Of the array, for messages.
+        size: Bytes of the file.
     """
     version = np.lib.format.read_magic(file)
     # other versions are for records of very many fields, with headers of any length

@@ -56,7 +56,7 @@ def opencv_name(path: str | Path) -> str:
     OpenCV would take a relative name with a colon for an address.
 
     Raises:
-        InputError: the name is not UTF-8. OpenCV would end the process.
+        InputError: The name is not UTF-8. OpenCV would end the process.
     """
     name = os.path.abspath(path)
     try:
@@ -94,12 +94,12 @@ def replaced_file(path: str | Path, mark: bytes) -> AbstractContextManager[Path]
     If the `with` block raises, the earlier file is kept.
 
     Args:
-        path: the file.
-        mark: the beginning of an earlier file. Any other file, and a link, is not
+        path: The file.
+        mark: The beginning of an earlier file. Any other file, and a link, is not
             replaced.
 
     Raises:
-        InputError: something else has the name, or it cannot be written; the disk may
+        InputError: Something else has the name, or it cannot be written; the disk may
             be full.
     """
     check = partial(check_replaceable, mark=mark)
@@ -114,13 +114,13 @@ def replaced_folder(
     If the body fails, the earlier folder stays.
 
     Args:
-        path: the folder.
-        check: raises InputError if something that must not be replaced has the name.
-        names: names of the files of an earlier folder. One with anything else is not
+        path: The folder.
+        check: Raises InputError if something that must not be replaced has the name.
+        names: Names of the files of an earlier folder. One with anything else is not
             replaced.
 
     Raises:
-        InputError: something else has the name, or it cannot be written; the disk may
+        InputError: Something else has the name, or it cannot be written; the disk may
             be full.
     """
 
@@ -185,8 +185,8 @@ class Unfinished:
     seems to be in use.
 
     Attributes:
-        path: the folder.
-        info: content of the mark.
+        path: The folder.
+        info: Content of the mark.
     """
 
     def __init__(
@@ -208,7 +208,7 @@ class Unfinished:
         """Return a new folder with a mark that contains `info`.
 
         Raises:
-            OSError: the disk is full, or the folder cannot be created.
+            OSError: The disk is full, or the folder cannot be created.
         """
         made = made_folders(target.parent)
         path = _created_folder(target)
@@ -264,11 +264,11 @@ class Unfinished:
         """Give the folder its target's name.
 
         Args:
-            names: names of the result's files.
-            replace: whether to replace an earlier folder that contains only such files.
+            names: Names of the result's files.
+            replace: Whether to replace an earlier folder that contains only such files.
 
         Raises:
-            OSError: the earlier folder contains anything else, or a folder with the
+            OSError: The earlier folder contains anything else, or a folder with the
                 target's name has appeared meanwhile.
         """
         if replace and os.path.lexists(self._target):
@@ -396,7 +396,7 @@ def _named(building: Path, target: Path) -> None:
     creates the name with an empty file, which the content then replaces.
 
     Raises:
-        FileExistsError: the name is not free.
+        FileExistsError: The name is not free.
     """
     try:
         os.link(building, target)

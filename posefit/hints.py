@@ -30,8 +30,8 @@ def resolved(function: Callable[..., Any], hint: Any) -> Any:
     evaluated is returned unchanged.
 
     Args:
-        function: the function or class that the hint belongs to.
-        hint: the hint.
+        function: The function or class that the hint belongs to.
+        hint: The hint.
     """
     if not isinstance(hint, str):
         return hint
@@ -88,7 +88,7 @@ def fitted(hint: Any, value: Any) -> Any:
     """Return a value as a hint demands it: a list as a tuple, or a tuple as a list.
 
     Raises:
-        UnfitError: the value does not fit, or the hint is not checkable.
+        UnfitError: The value does not fit, or the hint is not checkable.
     """
     hint = _plain(hint)
     origin = get_origin(hint)
@@ -119,7 +119,7 @@ def read(hint: Any, text: str) -> Any:
     For a tuple `3,4.5` is two numbers, for a str it is a text.
 
     Raises:
-        UnfitError: the text has no meaning.
+        UnfitError: The text has no meaning.
     """
     for value in _values(text):
         try:

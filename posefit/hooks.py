@@ -59,10 +59,10 @@ class RegisterOptimiser(Protocol):
         """Register an optimiser.
 
         Args:
-            name: how users name it.
-            factory: takes (space, rng) and keyword-only settings.
-            next_frame: what happens to the optimiser in the next frame.
-            needs: a module that the factory imports, and what to install for it.
+            name: How users name it.
+            factory: Takes (space, rng) and keyword-only settings.
+            next_frame: What happens to the optimiser in the next frame.
+            needs: A module that the factory imports, and what to install for it.
         """
 
 
@@ -89,11 +89,11 @@ class RegisterTracker(Protocol):
         """Register a tracker.
 
         Args:
-            name: how users name it.
-            factory: takes (task) and keyword-only settings.
-            looks_ahead: whether it takes several observations before it yields the
+            name: How users name it.
+            factory: Takes (task) and keyword-only settings.
+            looks_ahead: Whether it takes several observations before it yields the
                 frame of the first.
-            needs: a module that the factory imports, and what to install for it.
+            needs: A module that the factory imports, and what to install for it.
         """
 
 
@@ -115,9 +115,9 @@ class RegisterPrior(Protocol):
         """Register a prior.
 
         Args:
-            name: how users name it.
-            factory: takes keyword-only settings.
-            needs: a module that the factory imports, and what to install for it.
+            name: How users name it.
+            factory: Takes keyword-only settings.
+            needs: A module that the factory imports, and what to install for it.
         """
 
 
@@ -139,9 +139,9 @@ class RegisterStart(Protocol):
         """Register a start.
 
         Args:
-            name: how users name it.
-            factory: takes (task) and keyword-only settings.
-            needs: a module that the factory imports, and what to install for it.
+            name: How users name it.
+            factory: Takes (task) and keyword-only settings.
+            needs: A module that the factory imports, and what to install for it.
         """
 
 
@@ -168,11 +168,11 @@ class RegisterSegmenter(Protocol):
         """Register a segmenter.
 
         Args:
-            name: how users name it.
-            factory: takes (film) and keyword-only settings.
-            still_background: whether it needs a still background. If so, motion outside
+            name: How users name it.
+            factory: Takes (film) and keyword-only settings.
+            still_background: Whether it needs a still background. If so, motion outside
                 its masks counts against them.
-            needs: a module that the factory imports, and what to install for it.
+            needs: A module that the factory imports, and what to install for it.
         """
 
 
@@ -198,9 +198,9 @@ class RegisterDevice(Protocol):
         """Register a device.
 
         Args:
-            name: how users name it.
-            factory: takes nothing. Raises InputError if the machine has no such device.
-            needs: a module that the factory imports, and what to install for it.
+            name: How users name it.
+            factory: Takes nothing. Raises InputError if the machine has no such device.
+            needs: A module that the factory imports, and what to install for it.
         """
 
 

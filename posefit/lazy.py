@@ -19,8 +19,8 @@ def names_of_stub(
     """Return `__getattr__`, `__dir__` and the names of a module.
 
     Args:
-        module: the module's name.
-        file: its file. A stub in the same folder declares the names.
+        module: The module's name.
+        file: Its file. A stub in the same folder declares the names.
     """
     stub = Path(file).with_suffix(".pyi").read_text(encoding="utf-8")
     homes = {name: home for home, name in _IMPORT.findall(stub)}

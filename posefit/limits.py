@@ -105,8 +105,8 @@ def end_with_parent(parent: int, clean_up: Callable[[], None] | None = None) -> 
     """End this process soon after its parent process has ended in any way.
 
     Args:
-        parent: the parent's process id.
-        clean_up: is called before.
+        parent: The parent's process id.
+        clean_up: Is called before.
     """
 
     def watch() -> None:
@@ -150,8 +150,8 @@ def check_decoded(name: str, size: int) -> None:
     Such masks take time rather than memory if they are unpacked frame by frame.
 
     Args:
-        name: of the masks, for the message.
-        size: bytes that they unpack to.
+        name: Of the masks, for the message.
+        size: Bytes that they unpack to.
     """
     text = os.environ.get(DECODED, "")
     try:

@@ -32,7 +32,6 @@ class Option(NamedTuple):
         identifies: Whether a resumed track must have the same value.
         heading: The heading in the help, for this option and the next ones.
         live: Whether `posefit track --live` takes the option.
-
     """
 
     help: str

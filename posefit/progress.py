@@ -17,9 +17,9 @@ class Progress:
     """Receives messages and shows the steps of a loop; by default it does nothing.
 
     Attributes:
-        log: takes a message.
-        steps: takes an iterator and its length, and returns the same steps.
-        phases: seconds that each phase took, by name.
+        log: Takes a message.
+        steps: Takes an iterator and its length, and returns the same steps.
+        phases: Seconds that each phase took, by name.
     """
 
     log: Callable[[str], None] = lambda _message: None

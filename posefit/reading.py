@@ -73,7 +73,7 @@ def existing(path: Path) -> Path:
     """Return a path.
 
     Raises:
-        InputError: it does not exist, or is an empty file.
+        InputError: It does not exist, or is an empty file.
     """
     if not path.exists():
         if path.suffix:
@@ -88,8 +88,8 @@ def check_size(path: Path, most: int) -> None:
     """Raise InputError if a file is too large, or is a folder, a pipe or a device.
 
     Args:
-        path: the file.
-        most: bytes that it may have.
+        path: The file.
+        most: Bytes that it may have.
     """
     state = path.stat()
     if not stat.S_ISREG(state.st_mode):
@@ -111,13 +111,13 @@ def read_text(path: str | Path, most: int, what: str = "text") -> str:
     """Return the text of a file, without a byte-order mark.
 
     Args:
-        path: the file.
-        most: bytes that it may have.
-        what: kind of text, for messages.
+        path: The file.
+        most: Bytes that it may have.
+        what: Kind of text, for messages.
 
     Raises:
-        InputError: the file is larger, is not UTF-8 or cannot be read.
-        FileNotFoundError: there is no such file.
+        InputError: The file is larger, is not UTF-8 or cannot be read.
+        FileNotFoundError: There is no such file.
     """
     path = Path(path)
     try:
@@ -141,8 +141,8 @@ def parsed_toml(text: str) -> dict[str, Any]:
     """Return the tables of a TOML text.
 
     Raises:
-        InputError: the text is nested so deeply that it must be hostile.
-        ValueError: the text is not TOML.
+        InputError: The text is nested so deeply that it must be hostile.
+        ValueError: The text is not TOML.
     """
     weight = 0
     for number, line in enumerate(text.splitlines(), 1):
@@ -167,8 +167,8 @@ def parsed_json(text: str | bytes) -> Any:
     """Return the value of a JSON text.
 
     Raises:
-        InputError: the text is nested so deeply that it must be hostile.
-        ValueError: the text is not JSON.
+        InputError: The text is nested so deeply that it must be hostile.
+        ValueError: The text is not JSON.
     """
     try:
         return json.loads(text)

@@ -51,15 +51,15 @@ class Offer:
     """One registered name.
 
     Attributes:
-        kind: kind of plugin.
-        name: the name.
-        factory: takes the arguments of its kind, and keyword-only settings.
-        distribution: the installed package that registered it.
-        version: of the distribution.
-        next_frame: what becomes of an optimiser in the next frame.
-        looks_ahead: whether a tracker does.
-        still_background: whether a segmenter needs one.
-        needs: a module that the factory imports, and what to install for it.
+        kind: Kind of plugin.
+        name: The name.
+        factory: Takes the arguments of its kind, and keyword-only settings.
+        distribution: The installed package that registered it.
+        version: Of the distribution.
+        next_frame: What becomes of an optimiser in the next frame.
+        looks_ahead: Whether a tracker does.
+        still_background: Whether a segmenter needs one.
+        needs: A module that the factory imports, and what to install for it.
     """
 
     kind: Kind
@@ -127,14 +127,14 @@ class Plugin(NamedTuple):
     """One entry point, and its offers.
 
     Attributes:
-        name: of the entry point.
-        distribution: the installed package.
-        version: of the distribution.
-        state: what happened when it was loaded.
-        cause: why it is not loaded.
-        offers: of the kinds that were asked for.
-        commands: if commands were asked for.
-        traceback: of the error that broke it.
+        name: Of the entry point.
+        distribution: The installed package.
+        version: Of the distribution.
+        state: What happened when it was loaded.
+        cause: Why it is not loaded.
+        offers: Of the kinds that were asked for.
+        commands: If commands were asked for.
+        traceback: Of the error that broke it.
     """
 
     name: str
@@ -171,8 +171,8 @@ class Registry:
         """Return the optimiser factory with a name.
 
         Raises:
-            InputError: there is none; the message lists the known names.
-            ImportError: a library that it needs is not installed.
+            InputError: There is none; the message lists the known names.
+            ImportError: A library that it needs is not installed.
         """
         return self.offer("optimiser", name).factory
 
@@ -180,8 +180,8 @@ class Registry:
         """Return the prior factory with a name.
 
         Raises:
-            InputError: there is none; the message lists the known names.
-            ImportError: a library that it needs is not installed.
+            InputError: There is none; the message lists the known names.
+            ImportError: A library that it needs is not installed.
         """
         return self.offer("prior", name).factory
 
@@ -191,8 +191,8 @@ class Registry:
         `family:NAME` is the offer `family` with its setting `variant`.
 
         Raises:
-            InputError: there is none; the message lists the known names.
-            ImportError: a library that it needs is not installed.
+            InputError: There is none; the message lists the known names.
+            ImportError: A library that it needs is not installed.
         """
         known = self.offers[kind]
         family, colon, variant = name.partition(":")
@@ -258,10 +258,10 @@ def register(factories: Mapping[str, tuple[Callable[..., Any], str]]) -> None:
     """Register optimisers in this process only.
 
     Args:
-        factories: factory, and digest of its source, by name.
+        factories: Factory, and digest of its source, by name.
 
     Raises:
-        InputError: a plugin has registered one of the names, or a name is invalid.
+        InputError: A plugin has registered one of the names, or a name is invalid.
     """
     for name, (factory, digest) in factories.items():
         if not _NAME.fullmatch(name):
@@ -362,10 +362,10 @@ def load(
     Of several offers with the same name, only the first is loaded.
 
     Args:
-        points: the entry points.
-        kinds: only the hooks of these kinds are called; may include COMMAND.
-        variables: environment variables.
-        taken: names of posefit's own commands.
+        points: The entry points.
+        kinds: Only the hooks of these kinds are called; may include COMMAND.
+        variables: Environment variables.
+        taken: Names of posefit's own commands.
     """
     owners = {f"command {name!r}": PROJECT for name in taken}
     blocked = {word.strip().lower() for word in variables.get(BLOCK, "").split(",")}

@@ -60,8 +60,8 @@ def check_hints(plugin: str, factory: Callable[..., Any]) -> None:
     """Raise InputError if a setting's type is one whose values cannot be checked.
 
     Args:
-        plugin: name of the plugin, for the message.
-        factory: its factory.
+        plugin: Name of the plugin, for the message.
+        factory: Its factory.
     """
     for setting in settings_of(factory):
         if not hints.checkable(setting.annotation):
@@ -114,12 +114,12 @@ def check(
     Numbers of NumPy become Python's.
 
     Args:
-        plugin: name of the plugin, for messages.
-        factory: its factory.
-        chosen: values by the settings' names.
+        plugin: Name of the plugin, for messages.
+        factory: Its factory.
+        chosen: Values by the settings' names.
 
     Raises:
-        InputError: a setting is unknown, or its value has a wrong type.
+        InputError: A setting is unknown, or its value has a wrong type.
     """
     known = _by_name(factory)
     values = {}
@@ -143,12 +143,12 @@ def planned(
     if the optimiser has these settings. Given values are kept.
 
     Args:
-        factory: the optimiser's factory.
-        chosen: given values by the settings' names.
-        evaluations: budget of one search.
+        factory: The optimiser's factory.
+        chosen: Given values by the settings' names.
+        evaluations: Budget of one search.
 
     Raises:
-        InputError: the population is larger than the budget. It might not fit the
+        InputError: The population is larger than the budget. It might not fit the
             memory.
     """
     known = _defaults(factory)
@@ -187,7 +187,7 @@ def parse(
     """Return settings that are given as text, with values of the settings' types.
 
     Raises:
-        InputError: a setting is unknown, or its text does not fit its type.
+        InputError: A setting is unknown, or its text does not fit its type.
     """
     known = _by_name(factory)
     values = {}
@@ -210,7 +210,7 @@ def parse_texts(
     The plugin's name and a dot may precede the setting's name.
 
     Raises:
-        InputError: a text has another form, a setting is unknown or given twice, or its
+        InputError: A text has another form, a setting is unknown or given twice, or its
             value does not fit its type.
     """
     chosen: dict[str, str] = {}

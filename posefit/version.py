@@ -31,8 +31,8 @@ def source_digest(module: str, without: tuple[str, ...] = ()) -> str:
     and compiled ones are ignored.
 
     Args:
-        module: name of the module.
-        without: folders at the top of the package that are ignored, too.
+        module: Name of the module.
+        without: Folders at the top of the package that are ignored, too.
 
     Returns:
         The digits, or "" if the package has no file.

@@ -362,7 +362,6 @@ def lines(
         before: The tracks that each change is compared with, which may be of another
             tracker; by default those of this tracker as it is.
         figure: The error that is compared.
-
     """
     heads = ["change"]
     for name in SITUATIONS:

@@ -110,9 +110,9 @@ def painted(body: Body, legs: Legs, camera: Camera, pose: Array, place: Array) -
     Each bone is the hull of the discs along it, two by two.
 
     Args:
-        body: the body, whose other bones are cones.
-        legs: the discs of its thighs and shanks.
-        camera: the camera.
+        body: The body, whose other bones are cones.
+        legs: The discs of its thighs and shanks.
+        camera: The camera.
         pose: (66,).
         place: (3,) metres, of the root.
     """

@@ -112,7 +112,6 @@ class Corrections(Wrapper):
         Args:
             seed: Seed of the environment.
             options: Options of the environment.
-
         """
         pictures, infos = self.env.reset(seed=seed, options=options)
         everyone = np.ones(self.num_envs, dtype=bool)
@@ -128,7 +127,6 @@ class Corrections(Wrapper):
         Returns:
             Observations (n, 2 p + d + 2), rewards (n,), two flags (n,), terminated and
             truncated, and infos.
-
         """
         proposals = self.proposals(np.asarray(actions, dtype=np.float64))
         pictures, rewards, terminated, truncated, infos = self.env.step(proposals)

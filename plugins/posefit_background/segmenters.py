@@ -25,8 +25,8 @@ def learned_mixture(
     It is learned from the whole video.
 
     Settings:
-        history: frames that it remembers, 1 or more.
-        threshold: squared distance from the nearest Gaussian, in standard deviations,
+        history: Frames that it remembers, 1 or more.
+        threshold: Squared distance from the nearest Gaussian, in standard deviations,
             above which a pixel is foreground; above 0.
     """
     at_least("history", history, 1)
@@ -40,7 +40,7 @@ def learned_median(film: Film, *, samples: int = SAMPLES) -> Still:
     The person may walk in these frames.
 
     Settings:
-        samples: number of frames, spread over the video, 1 or more; all are in memory
+        samples: Number of frames, spread over the video, 1 or more; all are in memory
             at once.
     """
     at_least("samples", samples, 1)
@@ -52,7 +52,7 @@ def given_mean(film: Film, *, background: str) -> Still:
     """Each pixel's background is its mean over frames of the empty scene.
 
     Settings:
-        background: these frames as A:B, or the file of a picture of the empty scene;
+        background: These frames as A:B, or the file of a picture of the empty scene;
             `--background` sets it.
     """
     start, colon, stop = background.partition(":")

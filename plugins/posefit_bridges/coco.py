@@ -1,9 +1,10 @@
 """posefit's suite for COCO's post-processing, which knows only its own suites.
 
->>> from posefit_bridges.coco import add_to_cocopp
->>> add_to_cocopp()  # doctest: +SKIP
->>> import cocopp  # doctest: +SKIP
->>> cocopp.main("coco/cma coco/pso")  # doctest: +SKIP
+Example:
+    >>> from posefit_bridges.coco import add_to_cocopp
+    >>> add_to_cocopp()  # doctest: +SKIP
+    >>> import cocopp  # doctest: +SKIP
+    >>> cocopp.main("coco/cma coco/pso")  # doctest: +SKIP
 """
 
 import math

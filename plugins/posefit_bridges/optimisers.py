@@ -136,9 +136,9 @@ def nevergrad(
     """An optimiser of Nevergrad, which proposes whole populations within a budget.
 
     Settings:
-        variant: a name of `nevergrad.optimizers.registry`; `nevergrad:NAME` sets it.
-        population_size: proposals at a time, its `num_workers`, 1 or more.
-        evaluations: budget of a frame, its `budget`, 1 or more; by default the
+        variant: A name of `nevergrad.optimizers.registry`; `nevergrad:NAME` sets it.
+        population_size: Proposals at a time, its `num_workers`, 1 or more.
+        evaluations: Budget of a frame, its `budget`, 1 or more; by default the
             search's.
     """
     import nevergrad as ng
@@ -209,8 +209,8 @@ def optuna(
     with every earlier one.
 
     Settings:
-        variant: a sampler of `optuna.samplers`; `optuna:SAMPLER` sets it.
-        population_size: proposals at a time, 1 or more.
+        variant: A sampler of `optuna.samplers`; `optuna:SAMPLER` sets it.
+        population_size: Proposals at a time, 1 or more.
     """
     from optuna import create_study, samplers
     from optuna.distributions import FloatDistribution
@@ -266,7 +266,7 @@ def pycma(
 
     Settings:
         population_size (lambda): 5 or more, or 0 for the library's choice.
-        spread (sigma): first step size without a prediction, in half-ranges of the box,
+        spread (sigma): First step size without a prediction, in half-ranges of the box,
             above 0. Ours.
     """
     from cma import CMAEvolutionStrategy
@@ -308,8 +308,8 @@ def pymoo(
     """An algorithm of pymoo, whose first population is drawn from the start.
 
     Settings:
-        variant: a single-objective algorithm with a population; `pymoo:NAME` sets it.
-        population_size: size of its population, 5 or more.
+        variant: A single-objective algorithm with a population; `pymoo:NAME` sets it.
+        population_size: Size of its population, 5 or more.
     """
     from pymoo.config import Config
     from pymoo.core.problem import Problem
@@ -355,7 +355,7 @@ def scipy(
 
     Settings:
         variant: "differential_evolution" or "dual_annealing"; `scipy:NAME` sets it.
-        population_size: size of differential evolution's population, 5 or more; dual
+        population_size: Size of differential evolution's population, 5 or more; dual
             annealing ignores it.
     """
     at_least("population_size", population_size, 5)

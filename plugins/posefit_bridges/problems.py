@@ -11,11 +11,12 @@ The problem's `infeasible` decides the cost of an infeasible proposal. Each resu
 an attribute `problem`, the suite's problem with its trace. Let the tool hold the
 budget: a problem's budget ends the tool's loop with an error.
 
->>> import posefit
->>> from posefit_bridges.problems import pymoo_problem
->>> problem = posefit.suite("posefit-2026.3", 1, 10_000, 9)
->>> pymoo_problem(problem).n_var
-9
+Example:
+    >>> import posefit
+    >>> from posefit_bridges.problems import pymoo_problem
+    >>> problem = posefit.suite("posefit-2026.3", 1, 10_000, 9)
+    >>> pymoo_problem(problem).n_var
+    9
 """
 
 from pathlib import Path

@@ -363,17 +363,16 @@ def count_on_device(chain, radii, view, size, observed, poses, translations, are
     """Write the areas R, B, Y of poses, one pose per block.
 
     Args:
-        chain: a `Chain`.
+        chain: A `Chain`.
         radii: (26, 2) metres.
         view: (16,): rotation, translation, focal lengths, centre.
-        size: width and height in pixels.
-        observed: the bit images (strips, rows) of the person and of valid pixels, as
+        size: Width and height in pixels.
+        observed: The bit images (strips, rows) of the person and of valid pixels, as
             32-bit words in the layout of `rasteriser`, and the number of the person's
             pixels (1,).
         poses: (n, 66).
         translations: (n, 3) metres.
         areas: (n, 3), the output.
-
     """
     width, height = size
     person, valid, pixels = observed

@@ -3,10 +3,11 @@
 It follows Hansen's tutorial (2016). The algorithm is `posefit.fitting.cma`, with which
 posefit also fits a person's build. `pycma` is an adapter to another implementation.
 
->>> import posefit
->>> track = posefit.track("walk", method="cma", frames=(0, 3))
->>> track.summary["iou"] > 0.5
-True
+Example:
+    >>> import posefit
+    >>> track = posefit.track("walk", method="cma", frames=(0, 3))
+    >>> track.summary["iou"] > 0.5
+    True
 """
 
 from posefit import hookimpl

@@ -30,12 +30,13 @@ change `proposals`. docs/measured/tracker-parts.md has the effect of each part.
 - `lookup`: the poses whose silhouettes resemble an observed one, for any method.
 - `kernels`: the compiled loops.
 
->>> import posefit
->>> track = posefit.track(
-...     "walk-a", method="exemplars", train=["walk-b", "walk-c"], frames=(0, 10)
-... )
->>> track.measures.lost_rate
-0.0
+Example:
+    >>> import posefit
+    >>> track = posefit.track(
+    ...     "walk-a", method="exemplars", train=["walk-b", "walk-c"], frames=(0, 10)
+    ... )
+    >>> track.measures.lost_rate
+    0.0
 """
 
 from posefit import hookimpl

@@ -53,7 +53,6 @@ def diverse_best(
         yaws: (n,) radians.
         totals: (n,) the cost of the best path to each state.
         count: How many states, at most.
-
     """
     bins = yaw_bins(yaws)
     order = np.argsort(totals, kind="stable")

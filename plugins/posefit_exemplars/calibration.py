@@ -39,7 +39,6 @@ def evidence(
         pose: (66,) the reported pose.
         cost: The cost of the reported pose, per cent.
         cameras: How many cameras show the person.
-
     """
     joints = skeleton.joints(posterior.poses)
     reported = skeleton.joints(pose)
@@ -123,7 +122,6 @@ def recalibrated(
         cost: Its cost, per cent. In a frame without usable silhouettes it counts as
             infinite.
         frame_costs: The costs of the frame.
-
     """
     calibration = stored_calibration()
     cost = cost if frame_costs.usable else math.inf

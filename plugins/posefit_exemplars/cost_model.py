@@ -151,7 +151,6 @@ class ClipSteps:
             camera: (3,) metres, the position of the only camera, or None for several.
             aligned: Whether the roots of the states are aligned. Those that are known
                 cost nothing.
-
         """
         step = self.step
         codes = exemplars.codes[after.states]
@@ -185,7 +184,6 @@ def root_costs(places: Array, expected: Array, camera: Array | None) -> Array:
         places: (n, 3) metres.
         expected: (..., n, 3) metres, where they were expected.
         camera: (3,) metres, the position of the only camera, or None for several.
-
     """
     return root_deviation_costs(places - expected, lines_of_sight(places, camera))
 
@@ -214,7 +212,6 @@ def root_deviation_costs(missed: Array, sights: Array | None) -> Array:
 
     Returns:
         The costs (..., n).
-
     """
     # axis by axis, because NumPy's sums over an axis of length 3 take far longer
     x, y, z = (missed[..., axis] for axis in range(3))
@@ -233,7 +230,6 @@ class ClipCosts:
     Args:
         task: The task, for the time between frames.
         temperature: Divides silhouette costs, for a thirtieth of a second.
-
     """
 
     def __init__(self, task: Task, temperature: float) -> None:
@@ -279,7 +275,6 @@ class HypothesisCosts:
         exemplars: The poses of clips.
         temperature: Divides silhouette costs on the path, for a thirtieth of a second.
         spread: Metres, the usual difference from where a pose leads on the path.
-
     """
 
     def __init__(
@@ -303,7 +298,6 @@ class HypothesisCosts:
 
         Returns:
             The costs (n,), and the least cost of a silhouette, per cent.
-
         """
         squares = self._exemplars.nearest(poses, 1)[1][:, 0]
         silhouette_costs = frame_costs.full(poses, places)
@@ -348,7 +342,6 @@ def motion_step_costs(spread: float, before: Hypotheses, after: Hypotheses) -> A
         spread: Standard deviation of a step, metres.
         before: The n hypotheses of one frame.
         after: The m hypotheses of the next frame.
-
     """
     scale = 0.5 / (spread**2 * len(JOINTS))
     total = np.zeros((len(before.joints), len(after.joints)))
@@ -382,7 +375,6 @@ class MaskNoise:
 
     Args:
         fps: Frames a second.
-
     """
 
     def __init__(self, fps: float) -> None:

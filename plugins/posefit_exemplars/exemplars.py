@@ -157,7 +157,6 @@ class Exemplars:
             motions: The motions to learn from.
             skeleton: The person's skeleton.
             mirrored: Whether the mirror images of the motions are learned too.
-
         """
         learned = learned_from(motions, skeleton, mirrored)
         return cls.assembled(motions, skeleton, learned)
@@ -220,7 +219,6 @@ class Exemplars:
         Returns:
             The length of each clip's part of the line, and the positions (K,) of the
             poses on it. One search in these finds times within any clip.
-
         """
         length = 1.0 + float(self.times.max())
         return length, self.clips * length + self.times
@@ -238,7 +236,6 @@ class Exemplars:
         Returns:
             The codes (n, D), the turns (n,) in radians, and the displacements (n, 3) in
             metres of a body whose yaw was 0.
-
         """
         last = self.last_states[self.clips[states]]
         length, line = self._line
@@ -290,7 +287,6 @@ class Exemplars:
         Returns:
             The states (n, count), nearest first, and the squared distances (n, count),
             infinite if the groups have fewer states.
-
         """
         codes = self.coding.of_poses(poses)
         states, squares = kernels.nearest_codes(
@@ -343,7 +339,6 @@ def learned_from(
 
     Raises:
         InputError: If there are no motions, or one has a single frame.
-
     """
     if not motions:
         raise InputError("exemplars must have motions to learn from, got none")

@@ -80,7 +80,6 @@ class FrameFits:
     Attributes:
         evaluations: The evaluations of all fits so far, and of the costs of the fitted
             poses.
-
     """
 
     def __init__(

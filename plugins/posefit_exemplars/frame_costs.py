@@ -46,7 +46,6 @@ class FrameCosts:
             cost at full size.
         usable: Whether the frame shows enough of the person.
         yaw: About which way the person faces, radians, or None if it is unknown.
-
     """
 
     def __init__(
@@ -117,7 +116,6 @@ class FrameCosts:
         Returns:
             The logarithms of the odds (2,) for legs and for arms, or None if the frame
             has no landmarks.
-
         """
         marks = self.observation.landmarks
         if marks is None or not marks[..., 2].any():
@@ -143,7 +141,6 @@ class FrameCosts:
 
         Returns:
             The reflected poses (cameras n, 66), camera by camera.
-
         """
         # each camera has its own line of sight, and so its own reflection
         reflected = []

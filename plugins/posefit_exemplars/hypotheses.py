@@ -61,7 +61,6 @@ class Hypotheses(NamedTuple):
             places: (n, 3) metres.
             parents: (n,) the rows of `before` that they continue, or -1 for fresh ones.
             before: The hypotheses of the frame before.
-
         """
         joints = root_centred(task.body.skeleton.joints(poses))
         turns = np.zeros_like(poses)

@@ -32,7 +32,6 @@ def lower_distances(distances, code, tile, partial):
 
     Returns:
         Whether all components were compared.
-
     """
     near = False
     for lane in range(LANES):
@@ -80,7 +79,6 @@ def nearest_codes(codes, groups, tiles, count):
     Returns:
         The states (n, count), nearest first, and the squared distances (n, count),
         infinite if the groups have fewer states.
-
     """
     squares = np.full((len(codes), count), np.inf, np.float32)
     states = np.zeros((len(codes), count), np.int64)
@@ -168,7 +166,6 @@ def cheapest_steps(sources, rows, tiles, buffers, bounds):
     Returns:
         The states, the row from which each is reached at least cost, and that total:
         the wanted states, and a few that cost a little more.
-
     """
     best, parents, reached = buffers
     distances = np.empty(LANES, np.float32)
@@ -225,7 +222,6 @@ def first_distinct(order, keys, kinds, share, count):
         kinds: (n,) the kind of each row, from 0.
         share: How many rows of a kind are returned, at most.
         count: How many rows are returned, at most.
-
     """
     is_used = np.zeros(keys.max() + 1, np.bool_)  # of each key
     of_kind = np.zeros(kinds.max() + 1, np.int64)  # rows chosen of each kind

@@ -163,7 +163,6 @@ def straightened(camera: Camera, silhouette: Silhouette) -> tuple[Mask, float, f
     Returns:
         The mask (PICTURE, PICTURE), and the azimuth and elevation of the new camera in
         radians.
-
     """
     mask = without_small_pieces(silhouette.mask)
     left, top, right, bottom = box_of(mask)
@@ -217,7 +216,6 @@ class Lookup:
         Returns:
             The states (n,), their yaws (n,), and the least squared distance, a mean
             over the cameras that show the whole person. None if no camera does.
-
         """
         total = np.zeros(1)
         views = list[tuple[Table, float]]()

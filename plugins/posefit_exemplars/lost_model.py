@@ -66,7 +66,6 @@ def evidence_of(
         skeleton: The person's skeleton.
         frame: The frame, with a posterior.
         cameras: The cameras.
-
     """
     assert frame.posterior is not None
     distances = joint_distances(
@@ -173,7 +172,6 @@ class LandmarkSides:
     Args:
         fps: Frames a second.
         cameras: The number of cameras.
-
     """
 
     def __init__(self, fps: float, cameras: int) -> None:
@@ -189,7 +187,6 @@ class LandmarkSides:
             odds: (2,) the logarithms of the odds that the frame's landmarks have legs
                 and arms on the sides of the pose.
             by_model: Whether left and right are known by the model of exchanged sides.
-
         """
         self._sums = self._decay * self._sums + [*odds, 1.0]
         legs, arms, count = self._sums

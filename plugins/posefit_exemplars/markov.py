@@ -46,7 +46,6 @@ def likeliest_paths(
         costs: (n,) the costs of the states.
         before: The likeliest paths of the frame before, or None in the first frame.
         steps: (m, n) the costs of the steps from each state before.
-
     """
     if before is None or steps is None:
         return LikeliestPaths(costs - costs.min(), np.full(len(costs), -1))
@@ -134,7 +133,6 @@ def mean_near(
         squares: (n,) their squared distances from that state, in standard deviations.
         poses: (n, 66) their poses.
         places: (n, 3) their places.
-
     """
     shares = weights * np.exp(-0.5 * squares)
     shares[row] += np.finfo(np.float64).tiny
@@ -180,7 +178,6 @@ def sample_states(
             begin in the first frame, independently.
         sampling: The number of paths K, and the power of likelihoods.
         rng: The random numbers.
-
     """
     first = window[0]
     paths, power = sampling

@@ -76,7 +76,6 @@ class ClipPath:
         evaluations: The budget of each frame.
         delay: How many frames later a frame is estimated.
         lag: How many frames later the tracker reports it.
-
     """
 
     def __init__(
@@ -109,7 +108,6 @@ class ClipPath:
             observations: The silhouettes and landmarks of the frames, in order.
             hypotheses: Says how many diverse states each estimate needs.
             rng: The random numbers.
-
         """
         for window in markov.windows(self._frames(observations, rng), self._delay):
             row = markov.viterbi_state([frame.paths for frame in window])
@@ -146,7 +144,6 @@ class ClipPath:
             latest: The frame before, or None.
             everywhere: Whether states from anywhere are proposed too.
             rng: The random numbers.
-
         """
         full, small = self._counts(frame_costs, latest is None)
         if latest is None:
@@ -200,7 +197,6 @@ class ClipPath:
 
         Returns:
             The states, their costs (n,), and the evaluations used.
-
         """
         rough = self._costs.of_small(frame_costs, poses, beam.places)
         used += len(beam)
@@ -241,7 +237,6 @@ class ClipPath:
             frame: The frame.
             row: The state on the path.
             count: How many diverse states the estimate gets as alternatives.
-
         """
         beam = frame.beam
         frame_costs = frame.frame_costs
@@ -276,7 +271,6 @@ class HypothesisPath:
         evaluations: The budget of the fits in each frame.
         delay: How many frames later a frame is reported.
         sampling: How paths are sampled.
-
     """
 
     def __init__(
@@ -306,7 +300,6 @@ class HypothesisPath:
 
         Yields:
             The estimates, each with up to `delay` later frames known.
-
         """
         sampled = None
         frames = self._frames(estimates, rng.spawn(1)[0])
@@ -376,7 +369,6 @@ class HypothesisPath:
             latest: The hypotheses of the frame before.
             rows: The rows of `latest` that continue.
             noise: The noise of the masks.
-
         """
         frame_costs = estimate.frame_costs
         continued = (latest.poses[rows], latest.places[rows])
@@ -424,7 +416,6 @@ class HypothesisPath:
         Returns:
             The states, and the probabilities (n, K) that groups of landmarks have left
             and right exchanged.
-
         """
         likelihoods = frame_costs.landmarks(hypotheses.poses, hypotheses.places)
         exchanged = usually_exchanged(likelihoods)[None]

@@ -140,7 +140,6 @@ class StateProposals:
         Returns:
             The states, their poses (n, 66), and the number of small pictures that the
             search used.
-
         """
         if self._task.first_pose is None:
             beam, used = self._anywhere(frame_costs, None, count, rng)
@@ -166,7 +165,6 @@ class StateProposals:
         Returns:
             The states, their poses (n, 66), and the number of small pictures that the
             search used.
-
         """
         continued_count = int(CONTINUED_SHARE * count)
         beam = next_states(self.exemplars, steps, continued_count)
@@ -197,7 +195,6 @@ class StateProposals:
 
         Returns:
             The states, and the number of small pictures that were evaluated.
-
         """
         group_count = max(int(SIMILAR_SHARE * count) // GROUP_POSES, 1)
         tried = max(count - group_count * GROUP_POSES, 1)
@@ -231,7 +228,6 @@ class StateProposals:
         Returns:
             The states (count,), and the rows (count,) of `states` that they are
             similar to.
-
         """
         members = self.exemplars.members
         starts = self.exemplars.starts
@@ -304,7 +300,6 @@ class HypothesisProposals:
         task: The task.
         exemplars: The poses of clips.
         evaluations: The budget of the fits in each frame.
-
     """
 
     def __init__(self, task: Task, exemplars: Exemplars, evaluations: float) -> None:
@@ -340,7 +335,6 @@ class HypothesisProposals:
             hypotheses: The n hypotheses of the frame before.
             totals: (n,) the costs of the likeliest sequences to them.
             frame_costs: The costs of the frame.
-
         """
         count = self.counts(frame_costs).continued
         flat = hypotheses.joints.reshape(len(hypotheses.joints), -1)  # (n, 81)
@@ -373,7 +367,6 @@ class HypothesisProposals:
             latest: The hypotheses of the frame before.
             rows: The rows of `latest` that continue.
             rng: The random numbers.
-
         """
         frame_costs = estimate.frame_costs
         other_poses, other_places = estimate.alternatives

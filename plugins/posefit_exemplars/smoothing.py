@@ -25,7 +25,6 @@ def smoothed(
         estimates: The estimates of the frames, in order.
         spread: Standard deviation of the Gaussian weights, frames.
         ahead: How many frames before and after each one count.
-
     """
     before: deque[Estimate] = deque(maxlen=ahead)
     for window in windows(estimates, ahead):
@@ -53,7 +52,6 @@ def smoothed_pose(
         places: (n, 3) their places.
         middle: The frame, as a row of `poses`.
         spread: Standard deviation of the weights, frames. 0 or less: no smoothing.
-
     """
     if spread <= 0.0:
         return poses[middle], places[middle]

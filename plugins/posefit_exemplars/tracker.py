@@ -27,14 +27,14 @@ class ExemplarTracker:
     """Follows the likeliest path through recorded clips (Toyama and Blake, 2001).
 
     Settings:
-        spread: distance of joints from where a clip continues, metres, rms, for a
+        spread: Distance of joints from where a clip continues, metres, rms, for a
             thirtieth of a second; above 0.
-        temperature: divides silhouette costs; above 0. The default is more than 1,
+        temperature: Divides silhouette costs; above 0. The default is more than 1,
             because the errors of successive frames are correlated.
-        lag: number of later frames used before a pose is reported, 0 or more.
-        smoothing: standard deviation of the smoothing over time, thirtieths of a
+        lag: Number of later frames used before a pose is reported, 0 or more.
+        smoothing: Standard deviation of the smoothing over time, thirtieths of a
             second, 0 or more.
-        samples: number of tracks drawn from the posterior, 1 or more.
+        samples: Number of tracks drawn from the posterior, 1 or more.
     """
 
     def __init__(
@@ -91,7 +91,6 @@ class ExemplarTracker:
         Args:
             observations: The silhouettes and landmarks of the frames, in order.
             rng: The random numbers.
-
         """
         path = self.clip_path.follow(observations, self.hypotheses.proposals, rng)
         estimates = self.hypotheses.follow(path, rng.spawn(1)[0])

@@ -8,10 +8,11 @@ They carry their particles from frame to frame.
 
 `weighting` finds how sharply to weigh the particles.
 
->>> import posefit
->>> track = posefit.track("walk", method="annealed", frames=(0, 3))
->>> track.summary["iou"] > 0.5
-True
+Example:
+    >>> import posefit
+    >>> track = posefit.track("walk", method="annealed", frames=(0, 3))
+    >>> track.summary["iou"] > 0.5
+    True
 """
 
 from posefit import hookimpl

@@ -40,13 +40,13 @@ class Annealed:
     the search narrows where they agree. A frame commits its best particle.
 
     Settings:
-        evaluations: budget of a frame, shared among the layers, 1 or more. Ours: as
+        evaluations: Budget of a frame, shared among the layers, 1 or more. Ours: as
             many as SAPSO's.
-        layers (M): number of layers of resampling, 1 or more.
-        survival (alpha): share of the particles that survives a layer, between 0 and 1.
-        diffusion: noise of a layer as a multiple of the particles' standard deviations,
+        layers (M): Number of layers of resampling, 1 or more.
+        survival (alpha): Share of the particles that survives a layer, between 0 and 1.
+        diffusion: Noise of a layer as a multiple of the particles' standard deviations,
             above 0. Ours.
-        noise (P0): standard deviation of the motion from frame to frame, in half-ranges
+        noise (P0): Standard deviation of the motion from frame to frame, in half-ranges
             of the box, above 0. Ours.
     """
 

@@ -35,10 +35,10 @@ class Particle:
     frame commits its best particle.
 
     Settings:
-        evaluations (N): number of particles, and budget of a frame, 1 or more. Ours: as
+        evaluations (N): Number of particles, and budget of a frame, 1 or more. Ours: as
             many as SAPSO's.
-        sharpness: how fast the likelihood exp(-sharpness cost) falls, above 0. Ours.
-        noise: standard deviation of the motion from frame to frame, in half-ranges of
+        sharpness: How fast the likelihood exp(-sharpness cost) falls, above 0. Ours.
+        noise: Standard deviation of the motion from frame to frame, in half-ranges of
             the box, above 0. Ours.
     """
 

@@ -7,10 +7,11 @@ Install it with `pip install 'posefit[mediapipe]'`. The handbook's page "How do 
 a person in a video?" shows how to install it without the parts that posefit does not
 need.
 
->>> from posefit.registry import registry
->>> offer = registry().offers["segmenter"]["mediapipe"]
->>> [setting.name for setting in offer.settings]
-['confidence', 'threshold']
+Example:
+    >>> from posefit.registry import registry
+    >>> offer = registry().offers["segmenter"]["mediapipe"]
+    >>> [setting.name for setting in offer.settings]
+    ['confidence', 'threshold']
 """
 
 from posefit import hookimpl

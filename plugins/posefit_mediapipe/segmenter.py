@@ -44,9 +44,9 @@ class MediaPipe:
     camera.
 
     Settings:
-        confidence: minimum confidence of a detection, 0 to 1; lower values detect small
+        confidence: Minimum confidence of a detection, 0 to 1; lower values detect small
             or distant people.
-        threshold: value of the soft mask above which a pixel is the person's, between 0
+        threshold: Value of the soft mask above which a pixel is the person's, between 0
             and 1.
     """
 

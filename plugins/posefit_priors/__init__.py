@@ -8,10 +8,11 @@
 - `sklearn.Transformed` is a decomposition of scikit-learn with an inverse, such as
   `sklearn:KernelPCA`.
 
->>> import posefit
->>> track = posefit.track("walk", method="@loose", frames=(0, 3))
->>> track.summary["iou"] > 0.5
-True
+Example:
+    >>> import posefit
+    >>> track = posefit.track("walk", method="@loose", frames=(0, 3))
+    >>> track.summary["iou"] > 0.5
+    True
 """
 
 from posefit import hookimpl

@@ -29,13 +29,13 @@ class Loose:
     skeleton's joint limits if the skeleton states some.
 
     Settings:
-        components (m): a whole number of them, or the least share of the variance that
+        components (m): A whole number of them, or the least share of the variance that
             they must retain, below 1. As `pca`.
-        arms_degrees: how far shoulders and elbows may deviate from the components, to
+        arms_degrees: How far shoulders and elbows may deviate from the components, to
             either side, 0 or more. Ours.
-        legs_degrees: how far hips and knees may deviate from the components, to either
+        legs_degrees: How far hips and knees may deviate from the components, to either
             side, 0 or more. Ours.
-        slack: largest distance of a pose from the clusters, in units of chi; above 0.
+        slack: Largest distance of a pose from the clusters, in units of chi; above 0.
             Ours.
     """
 

@@ -35,11 +35,11 @@ class PCA(Components):
     nearest cluster.
 
     Settings:
-        components (m): a whole number of them, or the least share of the variance that
+        components (m): A whole number of them, or the least share of the variance that
             they must retain, below 1. Section 2.1.
-        clusters (K): number of centres that K-means finds among the training poses, 1
+        clusters (K): Number of centres that K-means finds among the training poses, 1
             or more. Section 2.2.
-        quantile: the quantile of the training distances that gives chi, above 0 and at
+        quantile: The quantile of the training distances that gives chi, above 0 and at
             most 1. Interpretation S5.
     """
 

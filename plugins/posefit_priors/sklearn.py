@@ -42,9 +42,9 @@ class Transformed:
     about 100 us each, because a row must always give the same bits.
 
     Settings:
-        variant: the class, such as KernelPCA; `sklearn:NAME` sets it.
-        components (m): its `n_components`, 1 or more.
-        options: its other parameters, as a JSON object.
+        variant: The class, such as KernelPCA; `sklearn:NAME` sets it.
+        components (m): Its `n_components`, 1 or more.
+        options: Its other parameters, as a JSON object.
     """
 
     low: Array  # (m,)

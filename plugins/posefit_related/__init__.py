@@ -22,10 +22,11 @@ poses of `training`. None of these publications was available in full.
 docs/ways/related.md lists the available parts; docstrings name everything else as
 interpretations.
 
->>> import posefit
->>> track = posefit.track("walk", method="psopf", frames=(0, 3))
->>> track.summary["iou"] > 0.5
-True
+Example:
+    >>> import posefit
+    >>> track = posefit.track("walk", method="psopf", frames=(0, 3))
+    >>> track.summary["iou"] > 0.5
+    True
 """
 
 from posefit import hookimpl

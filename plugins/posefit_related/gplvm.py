@@ -68,8 +68,8 @@ class GPLVM:
     """Latents of a Gaussian process, learned from a subsample of poses.
 
     Settings:
-        components: dimensions of a latent, 1 or more.
-        poses: largest number of training poses to use, 20 or more.
+        components: Dimensions of a latent, 1 or more.
+        poses: Largest number of training poses to use, 20 or more.
     """
 
     low: Array  # (m,)

@@ -36,8 +36,8 @@ class Gradient:
     """A prediction at constant velocity, and iterated steps to the contours.
 
     Settings:
-        turn_degrees: standard deviation of an angle from its prediction, above 0.
-        damping: share of the velocity that the prediction retains, 0 or more.
+        turn_degrees: Standard deviation of an angle from its prediction, above 0.
+        damping: Share of the velocity that the prediction retains, 0 or more.
     """
 
     def __init__(

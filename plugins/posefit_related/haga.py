@@ -42,11 +42,11 @@ class HAGA:
 
     Settings:
         population_size: 2 or more.
-        layers: number of layers of coordinates, 1 or more.
-        evaluations: budget of a frame, shared among the layers, 1 or more. Ours: as
+        layers: Number of layers of coordinates, 1 or more.
+        evaluations: Budget of a frame, shared among the layers, 1 or more. Ours: as
             many as SAPSO's.
-        mutation: probability that a child's coordinate is mutated, 0 to 1.
-        spread: standard deviation of the first mutations without a prediction, in
+        mutation: Probability that a child's coordinate is mutated, 0 to 1.
+        spread: Standard deviation of the first mutations without a prediction, in
             half-ranges of the box, above 0.
     """
 

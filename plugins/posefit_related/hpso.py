@@ -37,15 +37,15 @@ class HPSO:
     The coordinates found by a stage are fixed in the stages that follow.
 
     Settings:
-        population_size: size of each swarm, 1 or more.
-        run_length: number of coordinates of a stage after the root's, 1 or more.
-        evaluations: budget of a frame, shared among the stages, 1 or more. Ours: as
+        population_size: Size of each swarm, 1 or more.
+        run_length: Number of coordinates of a stage after the root's, 1 or more.
+        evaluations: Budget of a frame, shared among the stages, 1 or more. Ours: as
             many as SAPSO's.
-        inertia (A): first factor on the old velocity, above 0.1; it falls towards 0.1
+        inertia (A): First factor on the old velocity, above 0.1; it falls towards 0.1
             in each stage.
-        acceleration: factor on the pulls towards the personal best and the swarm's
+        acceleration: Factor on the pulls towards the personal best and the swarm's
             best, 0 or more.
-        alpha: velocity limit, in half-ranges of the box, above 0. Ours.
+        alpha: Velocity limit, in half-ranges of the box, above 0. Ours.
     """
 
     def __init__(

@@ -53,8 +53,8 @@ class IsomapPrior:
     """Geodesic coordinates of poses, with a local linear inverse.
 
     Settings:
-        components: dimensions of a latent, 1 or more.
-        poses: largest number of training poses to use, 20 or more.
+        components: Dimensions of a latent, 1 or more.
+        poses: Largest number of training poses to use, 20 or more.
     """
 
     low: Array  # (m,)

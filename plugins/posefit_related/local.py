@@ -36,10 +36,10 @@ class Local:
     """Best-first search in one part after another, in rounds with smaller steps.
 
     Settings:
-        run_length: number of coordinates of a part after the root's, 1 or more.
-        step: first distance between neighbours, in half-ranges of the box, above 0.
-        patience: expansions without a better pose that end a part, 1 or more.
-        evaluations: budget of a frame, 1 or more. Ours: as many as SAPSO's.
+        run_length: Number of coordinates of a part after the root's, 1 or more.
+        step: First distance between neighbours, in half-ranges of the box, above 0.
+        patience: Expansions without a better pose that end a part, 1 or more.
+        evaluations: Budget of a frame, 1 or more. Ours: as many as SAPSO's.
     """
 
     def __init__(

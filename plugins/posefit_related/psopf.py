@@ -37,14 +37,14 @@ class PSOPF:
     """Particles that are resampled, moved by noise, then by a swarm, in every frame.
 
     Settings:
-        evaluations: budget of a frame, shared among the moves, 1 or more. Ours: as many
+        evaluations: Budget of a frame, shared among the moves, 1 or more. Ours: as many
             as SAPSO's.
-        iterations: moves of the swarm in a frame, 0 or more; 0 gives a plain particle
+        iterations: Moves of the swarm in a frame, 0 or more; 0 gives a plain particle
             filter.
-        sharpness: how fast the likelihood exp(-sharpness cost) falls, above 0. Ours.
-        noise: standard deviation of the motion from frame to frame, in half-ranges of
+        sharpness: How fast the likelihood exp(-sharpness cost) falls, above 0. Ours.
+        noise: Standard deviation of the motion from frame to frame, in half-ranges of
             the box, above 0. Ours.
-        alpha: velocity limit, in half-ranges of the box, above 0. Ours.
+        alpha: Velocity limit, in half-ranges of the box, above 0. Ours.
     """
 
     def __init__(

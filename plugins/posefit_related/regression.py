@@ -85,9 +85,9 @@ class Regression:
     """Kernel regression from silhouettes, and in a sequence from predicted poses too.
 
     Settings:
-        samples: number of training poses, each at a random yaw, 10 or more.
-        words: size of the codebook, 2 or more.
-        ridge: damping of the regression, above 0.
+        samples: Number of training poses, each at a random yaw, 10 or more.
+        words: Size of the codebook, 2 or more.
+        ridge: Damping of the regression, above 0.
     """
 
     def __init__(

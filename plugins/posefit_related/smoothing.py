@@ -39,12 +39,12 @@ class Smoothing:
     """A bootstrap filter over all frames, and a backward pass over its weights.
 
     Settings:
-        components: number of principal components of the pose, 1 or more. Ours.
-        sharpness: how fast the likelihood exp(-sharpness cost) falls, above 0.
+        components: Number of principal components of the pose, 1 or more. Ours.
+        sharpness: How fast the likelihood exp(-sharpness cost) falls, above 0.
             Ours.
-        spread: width of the motion, as a multiple of the change of training poses
+        spread: Width of the motion, as a multiple of the change of training poses
             from frame to frame, above 0. Ours.
-        backwards: whether weights are smoothed; if not, the filter's are used.
+        backwards: Whether weights are smoothed; if not, the filter's are used.
     """
 
     def __init__(

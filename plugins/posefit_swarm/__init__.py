@@ -6,10 +6,11 @@
   and Kennedy (2002).
 - `random.Random` draws uniformly. Every optimiser should beat it.
 
->>> import posefit
->>> track = posefit.track("walk", method="sapso", frames=(0, 3))
->>> track.summary["iou"] > 0.5
-True
+Example:
+    >>> import posefit
+    >>> track = posefit.track("walk", method="sapso", frames=(0, 3))
+    >>> track.summary["iou"] > 0.5
+    True
 """
 
 from posefit import hookimpl

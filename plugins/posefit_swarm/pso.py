@@ -31,9 +31,9 @@ class PSO:
     constraint is drawn again, as in the SAPSO paper.
 
     Settings:
-        population_size: size of the swarm, 1 or more.
-        phi (phi): sum of the two accelerations, above 4. Clerc and Kennedy 2002.
-        alpha (alpha): velocity limit as a share of each coordinate's half-range, above
+        population_size: Size of the swarm, 1 or more.
+        phi (phi): Sum of the two accelerations, above 4. Clerc and Kennedy 2002.
+        alpha (alpha): Velocity limit as a share of each coordinate's half-range, above
             0. As in SAPSO.
     """
 

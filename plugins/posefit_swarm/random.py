@@ -9,7 +9,7 @@ class Random:
     """Draws every population uniformly from the feasible part of the box.
 
     Settings:
-        population_size: size of a population, 1 or more.
+        population_size: Size of a population, 1 or more.
     """
 
     # other optimisers are compared with it

@@ -36,20 +36,20 @@ class SAPSO:
     """Algorithm 1. Positions are in the box [-1, 1]^d, in which every half-range is 1.
 
     Settings:
-        population_size (N): size of the swarm, 1 or more. Section 5.2.
-        iterations (C): number of moves, 1 or more; they follow one evaluation of
+        population_size (N): Size of the swarm, 1 or more. Section 5.2.
+        iterations (C): Number of moves, 1 or more; they follow one evaluation of
             the first positions (Interpretation S10). Section 5.2.
-        temperature (T): initial temperature of the annealing, above 0, in units of
+        temperature (T): Initial temperature of the annealing, above 0, in units of
             the cost. Section 5.2.
-        cooling (gamma): factor on the temperature after each iteration
+        cooling (gamma): Factor on the temperature after each iteration
             (Interpretation S6), 0 to 1. Section 5.2.
-        stop_temperature (T0): the search ends when the temperature falls to it, 0 or
+        stop_temperature (T0): The search ends when the temperature falls to it, 0 or
             more; at 0 only the iterations end the search. Interpretation S5.
-        inertia (A): initial factor on the old velocity, above 0.1; it falls towards
+        inertia (A): Initial factor on the old velocity, above 0.1; it falls towards
             0.1. Section 3.1, Interpretation S5.
-        acceleration (c1, c2): factor on the pulls towards the personal best and the
+        acceleration (c1, c2): Factor on the pulls towards the personal best and the
             swarm's best, 0 or more. Section 3.1.
-        alpha (alpha): velocity limit as a share of each coordinate's half-range,
+        alpha (alpha): Velocity limit as a share of each coordinate's half-range,
             above 0. Section 2.2.
     """
 

@@ -59,7 +59,6 @@ class Manifold:
 
         Returns:
             The covariances around the means.
-
         """
         errors = self.minus(states, means[:, None])
         between = (weights[..., None] * errors).swapaxes(1, 2) @ errors

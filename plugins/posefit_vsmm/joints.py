@@ -88,18 +88,17 @@ def detect(
     """Detect the points of a silhouette near where they are expected.
 
     Args:
-        lines: the silhouette.
+        lines: The silhouette.
         expected: (17, 2) pixels, where each point is expected.
         gates: (17,) pixels, how far from there each point is accepted.
-        leg: the length of a leg in pixels.
-        head: the radius of the head in pixels.
-        rules: how points are detected.
+        leg: The length of a leg in pixels.
+        head: The radius of the head in pixels.
+        rules: How points are detected.
 
     Returns:
         The points (17, 2) in pixels; their confidence (17,), 0 to 1; and how many
         end points are not assigned to a limb. A point that is not detected is at
         its expected position, with a confidence of 0.
-
     """
     points = expected.copy()
     confidence = np.zeros(len(POINTS))
@@ -330,7 +329,6 @@ class JointFilter:
 
         Returns:
             The filtered points (17, 2) in pixels.
-
         """
         # VSMM 2.7
         states = self._states @ _STEP.T

@@ -69,7 +69,6 @@ def with_sides(landmarks: Array, expected: Array) -> tuple[Array, Array]:
 
     Returns:
         The points in pixels, and their confidence: 0 for points without a landmark.
-
     """
     joints = ENDS[:, 0]
     single = joints == ENDS[:, 1]  # points that are joints, not the middle of two
@@ -140,7 +139,7 @@ class JointCameras:
         """Detect the joints in each camera's image.
 
         Args:
-            views: the silhouette in each camera; None for a camera without one.
+            views: The silhouette in each camera; None for a camera without one.
             expected: (43,) the expected state.
             spread: (33, 33) the covariance of its error.
             landmarks: (V, 27, 3) of an `Observation`. A joint is the mean of the
@@ -148,7 +147,6 @@ class JointCameras:
 
         Returns:
             One measurement per camera.
-
         """
         each = [None] * len(views) if landmarks is None else landmarks
         measured = []

@@ -158,7 +158,6 @@ def without_heading(states: Array) -> tuple[Array, Array]:
 
     Returns:
         The headings, and the states' quaternions (..., 10, 4) without them.
-
     """
     turns = quaternions_of(states).copy()
     headings = turns[..., 0, :] * [1.0, 0.0, 1.0, 0.0]

@@ -138,12 +138,11 @@ def differentiate(
     """Return a function's values at states, and its derivatives by their errors.
 
     Args:
-        function: takes states (r, n, 43) and returns values (r, n, ...).
+        function: Takes states (r, n, 43) and returns values (r, n, ...).
         states: (r, 43).
 
     Returns:
         The values (r, ...) and the derivatives (r, ..., 33).
-
     """
     errors = DIFFERENCE * np.concatenate(
         [np.zeros((1, ERROR)), np.eye(ERROR), -np.eye(ERROR)]

@@ -82,14 +82,13 @@ def regrouped(
     """Return a belief over other models.
 
     Args:
-        belief: the belief over the models `old`.
-        old: names of models.
-        models: names of the models of the result.
-        new: state, covariance and log-probability of each model that is not in `old`.
+        belief: The belief over the models `old`.
+        old: Names of models.
+        models: Names of the models of the result.
+        new: State, covariance and log-probability of each model that is not in `old`.
 
     Returns:
         The belief, with likelihoods of 1.
-
     """
     states = []
     covariances = []
@@ -302,13 +301,12 @@ class Switching:
         """Return the belief one frame later, and switch groups.
 
         Args:
-            before: the belief.
-            measure: returns the measurement of states.
+            before: The belief.
+            measure: Returns the measurement of states.
             points: (17, 2) the joints detected in the frame, which decide about groups.
 
         Returns:
             The belief over the models that are then active.
-
         """
         self._points = [*self._points, points][-3:]
         self._cycles += 1

@@ -200,7 +200,6 @@ class TrackFilter:
         Returns:
             The belief, with larger variances for missing limbs; the measurement of each
             camera; and the joints and their confidence as details of the frame.
-
         """
         expected, spread = self.switching.predicted(belief)
         measured = self._cameras.detect(views, expected, spread, observation.landmarks)
@@ -318,11 +317,11 @@ class VSMM:
             V6, V8, V9, V11, V14 and V15.
         structure: "variable" runs one group of models, and two during a switch; "all"
             runs all models always, a plain IMM.
-        process_noise (Q): of the models, as a multiple of their residuals' covariance,
+        process_noise (Q): Of the models, as a multiple of their residuals' covariance,
             above 0. Interpretation V7.
-        joint_noise (R): of the detected joints, as a multiple of their variances, above
+        joint_noise (R): Of the detected joints, as a multiple of their variances, above
             0. Interpretation V7.
-        recovery: whether a lost pose is estimated again and a lost limb is searched for
+        recovery: Whether a lost pose is estimated again and a lost limb is searched for
             in a larger area; by default yes, in the patent no. Interpretation V14.
     """
 

@@ -70,16 +70,15 @@ def frozen(name: str, values: ArrayLike, shape: tuple[int | str, ...]) -> Array:
     """Return a read-only float64 copy of finite numbers.
 
     Args:
-        name: the name of the numbers, which begins messages.
-        values: the numbers.
-        shape: the shape that they must have; a word in it means any length.
+        name: The name of the numbers, which begins messages.
+        values: The numbers.
+        shape: The shape that they must have; a word in it means any length.
 
     Returns:
         The copy.
 
     Raises:
-        InputError: if they are not numbers, have another shape, or are not finite.
-
+        InputError: If they are not numbers, have another shape, or are not finite.
     """
     sides = f"({', '.join(map(str, shape))}{',' if len(shape) == 1 else ''})"
     try:

@@ -39,13 +39,12 @@ def stored(kind: str, key: bytes, make: Callable[[], Arrays]) -> Arrays:
     """Return the arrays of a key, read from the cache, or made and written to it.
 
     Args:
-        kind: the name of the folder in the cache.
-        key: the data that the arrays are made from, or a digest of it.
-        make: returns the arrays by name; always the same ones for the same key.
+        kind: The name of the folder in the cache.
+        key: The data that the arrays are made from, or a digest of it.
+        make: Returns the arrays by name; always the same ones for the same key.
 
     Returns:
         The arrays by name.
-
     """
     name = hashlib.sha256(key).hexdigest()[:32]
     try:

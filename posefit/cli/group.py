@@ -21,7 +21,7 @@ class Group(click.Group):
         """Return the command that the first word names.
 
         Raises:
-            click.UsageError: there is no such command.
+            click.UsageError: There is no such command.
         """
         if args[0][:1].isalnum() and self.get_command(context, args[0]) is None:
             root = context.find_root()

@@ -55,7 +55,7 @@ def explanation(registry: Registry, name: str) -> Iterator[str]:
     """Yield the lines of `posefit plugins show`, for every plugin with the name.
 
     Raises:
-        InputError: there is none; the message lists the known names.
+        InputError: There is none; the message lists the known names.
     """
     offers: list[Offer] = []
     for kind in KINDS:
@@ -110,8 +110,8 @@ def diagnosis(
     """Return the lines of `posefit plugins doctor`, and whether all is well.
 
     Args:
-        plugins: the plugins.
-        verbose: whether to add the traceback of a broken plugin.
+        plugins: The plugins.
+        verbose: Whether to add the traceback of a broken plugin.
     """
     lines = []
     if BLOCK in os.environ:

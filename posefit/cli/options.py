@@ -127,7 +127,7 @@ def track_flags(*names: str) -> list[Decorator]:
     """Return the click options of some options of a track.
 
     Args:
-        names: the options, by default all that the command line has.
+        names: The options, by default all that the command line has.
     """
     flags: list[Decorator] = []
     heading = ""

@@ -162,7 +162,7 @@ def _numbers(start: int | None, stop: int | None) -> range:
     """Return the instances of a range A:B.
 
     Raises:
-        InputError: there are none.
+        InputError: There are none.
     """
     from posefit.motion.instances import INSTANCES
 

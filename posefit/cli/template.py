@@ -27,13 +27,13 @@ def write_plugin(
     """Write a small installable plugin, and return its folder.
 
     Args:
-        name: the plugin's name.
-        kind: optimiser, prior, tracker, start, segmenter or command.
-        folder: the new folder, by default `posefit-NAME`.
-        commands: names of posefit's own commands, which a new one cannot have.
+        name: The plugin's name.
+        kind: Optimiser, prior, tracker, start, segmenter or command.
+        folder: The new folder, by default `posefit-NAME`.
+        commands: Names of posefit's own commands, which a new one cannot have.
 
     Raises:
-        InputError: the name cannot be a plugin's, or the folder exists.
+        InputError: The name cannot be a plugin's, or the folder exists.
     """
     one_of("kind", kind, (*CHECKED_KINDS, COMMAND))
     if not re.fullmatch(r"[a-z][a-z0-9]*([-_][a-z0-9]+)*", name):

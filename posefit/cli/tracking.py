@@ -304,7 +304,6 @@ def extraction_of(
 
     Raises:
         InputError: The options are given for a source that is not segmented.
-
     """
     from posefit.footage.extraction import Extraction, segmenter_name
     from posefit.footage.uses import useless_for

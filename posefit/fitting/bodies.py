@@ -42,7 +42,6 @@ def scaled_bodies(
         girths: (m, 26) factors of the radii.
         height: Each body is scaled to this stature in metres, see `Body.stature`. None:
             statures are not changed.
-
     """
     offsets = body.skeleton.offsets * lengths[:, :, None]
     radii = body.radii * girths[:, :, None]
@@ -130,7 +129,6 @@ class ObservedFrames:
             poses: (f, 66).
             places: (m, f, 3) metres.
             threads: Number of threads. Does not change the areas.
-
         """
         pairs = places.shape[0] * places.shape[1]
         count_poses(float(pairs * len(cameras)))
@@ -219,10 +217,9 @@ class HeldFrames:
         Args:
             offsets: (m, 26, 3) metres, their bones at rest.
             radii: (m, 26, 2) metres.
-            aligned: whether each body is placed to fill the silhouettes' boxes.
-            beta: weight of the missed share, 0 to 1; the spilled share has 1 - beta.
-            threads: number of threads. Does not change the costs.
-
+            aligned: Whether each body is placed to fill the silhouettes' boxes.
+            beta: Weight of the missed share, 0 to 1; the spilled share has 1 - beta.
+            threads: Number of threads. Does not change the costs.
         """
         chain = self.body.skeleton.chain
         bodies = Bodies(_turned(self.body, offsets), np.ascontiguousarray(radii))

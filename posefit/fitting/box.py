@@ -225,7 +225,6 @@ def _redrawn(
 
     Returns:
         The proposals (count, d), and the rows that never were feasible.
-
     """
     drawn = draw(np.arange(count))
     broken = np.flatnonzero(~space.feasible(drawn))

@@ -63,7 +63,6 @@ def revived(
         rng: The generator of the filter.
         evaluations: The budget of a search.
         make: Builds the filter.
-
     """
     known = {name: _made(value) for name, value in state["space"].items()}
     space = replace(space, **known)

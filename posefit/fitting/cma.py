@@ -108,7 +108,6 @@ class Strategy:
             mean: (d,) the mean of the first generation.
             spread: (d,) its standard deviations.
             population: The number of proposals in a generation.
-
         """
         d = len(mean)
         self.mean = np.array(mean, dtype=np.float64)
@@ -217,7 +216,7 @@ class CMAES:
     Settings:
         population_size (lambda): 5 or more, or 0 for 4 + 3 ln d, at least 5. Hansen
             2016.
-        spread (sigma): the initial step size without a prediction, in half-ranges of
+        spread (sigma): The initial step size without a prediction, in half-ranges of
             the box, above 0. Ours.
     """
 

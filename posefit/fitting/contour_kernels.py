@@ -211,7 +211,6 @@ def _nearest_disc(x, y, cone):
     Returns:
         Its share of the bone, the offset (2,) of the point from its centre, and its
         radius.
-
     """
     x -= cone.x
     y -= cone.y
@@ -452,7 +451,6 @@ def write_cap_points(cone, points, count):
 
     Returns:
         The number of all points.
-
     """
     dx = cone.axis_x
     dy = cone.axis_y
@@ -645,14 +643,14 @@ def _add_growth(b, parent, rows, per_metre, drawn, worth, grown, forces):
     as its product, the same sums give gradients and second derivatives.
 
     Args:
-        b: the bone.
-        parent: the joint where it starts.
-        rows: derivatives (6, 6) of the bone's numbers by a twist, from (8).
-        per_metre: the pixels per metre at each joint.
-        drawn: the Hessian and the gradient by the bone's numbers, from (5).
-        worth: the weight of the view's residuals, from (6).
-        grown: the derivatives by the factors; its `squares` are added to.
-        forces: the spatial forces (6, 1 + F) of the bone, which are added to.
+        b: The bone.
+        parent: The joint where it starts.
+        rows: Derivatives (6, 6) of the bone's numbers by a twist, from (8).
+        per_metre: The pixels per metre at each joint.
+        drawn: The Hessian and the gradient by the bone's numbers, from (5).
+        worth: The weight of the view's residuals, from (6).
+        grown: The derivatives by the factors; its `squares` are added to.
+        forces: The spatial forces (6, 1 + F) of the bone, which are added to.
     """
     block, gradient = drawn
     factors = len(grown.joints)
@@ -743,13 +741,13 @@ def composite_hessian(chain, screws, hessians, forces, matrix, gradients):
     spatial inertias.
 
     Args:
-        chain: the skeleton's.
-        screws: twists (69, 6) of the place and the pose, 0 for a number that is held.
-        hessians: spatial Hessians of the bones. Each is overwritten with the sum over
+        chain: The skeleton's.
+        screws: Twists (69, 6) of the place and the pose, 0 for a number that is held.
+        hessians: Spatial Hessians of the bones. Each is overwritten with the sum over
             all bones that move with the joint.
-        forces: spatial forces of the bones, overwritten in the same way.
-        matrix: second derivatives (69, 69); only the lower half is written.
-        gradients: the gradient and its derivatives by factors (69, 1 + F).
+        forces: Spatial forces of the bones, overwritten in the same way.
+        matrix: Second derivatives (69, 69); only the lower half is written.
+        gradients: The gradient and its derivatives by factors (69, 1 + F).
     """
     parents = chain.parents
     _sum_towards_root(parents, hessians, forces)
@@ -966,11 +964,11 @@ def add_all_bones(chain, placed, bones, free, out):
     """Write the results of `composite_hessian` for T frames.
 
     Args:
-        chain: the skeleton's.
-        placed: frames, sines and cosines from `place_frames`.
-        bones: spatial Hessians and forces, which are overwritten.
-        free: indices (m,) of the numbers of a frame that may change.
-        out: the arrays to write. Second derivatives (T, m, m), and gradients with their
+        chain: The skeleton's.
+        placed: Frames, sines and cosines from `place_frames`.
+        bones: Spatial Hessians and forces, which are overwritten.
+        free: Indices (m,) of the numbers of a frame that may change.
+        out: The arrays to write. Second derivatives (T, m, m), and gradients with their
             derivatives by factors (T, m, 1 + F).
     """
     frames, sines, cosines = placed

@@ -82,11 +82,11 @@ class MaskContours:
         """Return the borders of a person from the masks of one camera.
 
         Args:
-            camera: the camera.
-            view: its number.
-            observations: the frames.
-            places: places (T, 3) of the person's root, roughly.
-            spacing: metres between two points of a border, roughly. Points are at least
+            camera: The camera.
+            view: Its number.
+            observations: The frames.
+            places: Places (T, 3) of the person's root, roughly.
+            spacing: Metres between two points of a border, roughly. Points are at least
                 a pixel apart.
         """
         per_metre, factor = coarseness(camera, places)
@@ -261,13 +261,13 @@ def contour_squares(
     """Return the squared distances between the borders of masks and of a body.
 
     Args:
-        body: the person's.
-        views: the contours that each camera shows, of T frames, or of a single frame
+        body: The person's.
+        views: The contours that each camera shows, of T frames, or of a single frame
             that all poses share.
-        poses: poses (T, 66).
-        places: places (T, 3).
+        poses: Poses (T, 66).
+        places: Places (T, 3).
         scale: metres. Larger distances count less.
-        grown: for each view, the derivatives of joints (T, F, 27, 3) and radii
+        grown: For each view, the derivatives of joints (T, F, 27, 3) and radii
             (F, 26, 2) by the factors. If it is empty, there are no factors.
 
     Returns:
@@ -309,14 +309,14 @@ def fitted(
     """Return poses (n, 66) and places (n, 3) fitted to the contours of one frame.
 
     Args:
-        body: the person's.
-        views: the contours that each camera shows in this frame.
-        start: the poses and the places to begin with. The prior pulls the places to
+        body: The person's.
+        views: The contours that each camera shows in this frame.
+        start: The poses and the places to begin with. The prior pulls the places to
             these.
-        means: the poses (n, 66) to which the prior pulls the angles.
-        precisions: the prior's precisions (69,) of places and angles.
-        scales: metres, one for each step. Larger distances count less.
-        threads: number of threads. Does not change the result.
+        means: The poses (n, 66) to which the prior pulls the angles.
+        precisions: The prior's precisions (69,) of places and angles.
+        scales: Metres, one for each step. Larger distances count less.
+        threads: Number of threads. Does not change the result.
     """
     free = _free_numbers(body.skeleton)
     poses = writeable(start[0].copy())
@@ -398,12 +398,12 @@ def contour_race(
     it is fitted, and a wrong one seldom becomes as cheap as the right one.
 
     Args:
-        body: the person's.
-        views: the contours that each camera shows.
-        start: the poses and the places to begin with.
-        weights: the precisions (69,) of places and angles, see `precisions`.
-        cost: returns the costs (n,) of poses at places. Each counts as an evaluation.
-        threads: number of threads. Does not change the result.
+        body: The person's.
+        views: The contours that each camera shows.
+        start: The poses and the places to begin with.
+        weights: The precisions (69,) of places and angles, see `precisions`.
+        cost: Returns the costs (n,) of poses at places. Each counts as an evaluation.
+        threads: Number of threads. Does not change the result.
 
     Returns:
         All poses and places, and the number of evaluations. A step counts as 27.
@@ -447,12 +447,12 @@ def contour_fit(
     counts as that many.
 
     Args:
-        task: the body and the cameras.
-        observation: the frame.
-        start: the pose (66,) and the place (3,) to begin with.
-        deviations: the expected errors of the start's angles, in radians, and of its
+        task: The body and the cameras.
+        observation: The frame.
+        start: The pose (66,) and the place (3,) to begin with.
+        deviations: The expected errors of the start's angles, in radians, and of its
             place, in metres.
-        evaluations: the most that the fit may take.
+        evaluations: The most that the fit may take.
 
     Returns:
         The pose (66,), the place (3,), and the number of evaluations that the steps

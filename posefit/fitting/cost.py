@@ -95,16 +95,16 @@ class SilhouetteCost:
     and with any number of threads. A `Problem` counts the calls.
 
     Args:
-        body: the person's body.
-        cameras: one or several.
-        silhouettes: one per camera, of its size.
-        space: the box of proposals, which decodes them to poses.
-        beta: weight of the missed share, 0 to 1; the spilled share has 1 - beta.
-        threads: number of threads. Does not change the costs.
-        blank: whether all silhouettes may be empty, as in the middle of a track.
+        body: The person's body.
+        cameras: One or several.
+        silhouettes: One per camera, of its size.
+        space: The box of proposals, which decodes them to poses.
+        beta: Weight of the missed share, 0 to 1; the spilled share has 1 - beta.
+        threads: Number of threads. Does not change the costs.
+        blank: Whether all silhouettes may be empty, as in the middle of a track.
 
     Raises:
-        InputError: the numbers of cameras and silhouettes or their sizes differ, all
+        InputError: The numbers of cameras and silhouettes or their sizes differ, all
             silhouettes are empty, pixels are not square, or `beta` or `threads` is out
             of range.
 
@@ -211,7 +211,6 @@ class SilhouetteCost:
         Args:
             poses: (n, 66).
             translations: (n, 3) metres, the roots.
-
         """
         return pose_costs(
             self.body,

@@ -32,7 +32,6 @@ def as_numpy(name: str, values: Any) -> tuple[Any, Callable[[Array], Any]]:
     Raises:
         InputError: The array has no numbers to read, because it is traced (`jit`,
             `vmap`) or needs a gradient.
-
     """
     if isinstance(values, np.ndarray | np.generic) or not hasattr(values, "__dlpack__"):
         return values, lambda results: results

@@ -86,7 +86,6 @@ def drive(
 
     Raises:
         BrokenRuleError: A frame is missing or breaks a rule.
-
     """
     waiting = deque[Observation]()  # taken observations, without frames yet
     reading = np.zeros(2)  # time of reading observations, which is not the tracker's

@@ -66,7 +66,6 @@ def _find_outermost(focal, scale, radii, relative, root, discs, outermost):
         root: The place of the root, in the camera's axes.
         discs: A buffer (3, 27).
         outermost: The array to write.
-
     """
     x, y, z = root
     for j in range(radii.size):
@@ -186,7 +185,6 @@ def unpack_proposals(
 
     Returns:
         Whether all values are finite.
-
     """
     first = proposals.shape[1] - latents.shape[1]
     total = 0.0

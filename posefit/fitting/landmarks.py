@@ -51,7 +51,6 @@ def landmark_likelihoods(
         landmarks: (V, 27, 3), see `Observation`.
         poses: (n, 66).
         places: (n, 3) metres.
-
     """
     joints = skeleton.joints(poses, places)
     groups = []
@@ -102,7 +101,6 @@ def exchanged_given(likelihoods: Array, exchanged: Array) -> Array:
     Args:
         likelihoods: (..., K, 2) from `landmark_likelihoods`.
         exchanged: (..., K) the probabilities before the landmarks were seen.
-
     """
     return logistic(
         np.log(exchanged)
@@ -120,7 +118,6 @@ def side_odds(likelihoods: Array) -> Array:
 
     Args:
         likelihoods: (K, 2) from `landmark_likelihoods` of the pose.
-
     """
     limb = np.arange(len(likelihoods)) % len(GROUPS)
     usual = usually_exchanged(likelihoods)

@@ -59,7 +59,6 @@ class Filter(Optimiser, Protocol):
 
         Args:
             space: Its box. The `start` of the box is the tracker's prediction.
-
         """
         ...
 

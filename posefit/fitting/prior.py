@@ -70,7 +70,6 @@ class Prior(Latents, Protocol):
 
         Returns:
             The prior, now fitted.
-
         """
         ...
 
@@ -132,7 +131,6 @@ class Tilt:
             motions: The motions.
             share: The range contains this share of the residuals of each angle.
             margin: Radians added to the range on either side.
-
         """
         tilts = np.concatenate([motion.poses[:, 1:3] for motion in motions])
         angles = np.concatenate([motion.poses[:, 3:] for motion in motions])
@@ -170,7 +168,6 @@ class Tilt:
         Args:
             added: (2,) the last residual.
             reach: (2,) radians, the half sides at most.
-
         """
         half = np.minimum(reach, 0.5 * (self.high - self.low))
         whole = self.high - self.low >= 2.0 * np.pi - 1e-12

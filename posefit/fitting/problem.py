@@ -60,16 +60,16 @@ def minimise(
     schedule may not know the budget. `budget_known` says that it does.
 
     Args:
-        problem: what to minimise; it must have a budget.
-        optimiser: an object with `ask` and `tell`, built for `problem.space`.
-        budget_known: whether the optimiser was built with the budget.
+        problem: What to minimise; it must have a budget.
+        optimiser: An object with `ask` and `tell`, built for `problem.space`.
+        budget_known: Whether the optimiser was built with the budget.
 
     Returns:
         The same problem: `problem.best`, `problem.best_cost`, `problem.trace`.
 
     Raises:
-        BudgetError: the budget is smaller than the first population.
-        InputError: the problem has no budget, the optimiser proposed nothing, or no
+        BudgetError: The budget is smaller than the first population.
+        InputError: The problem has no budget, the optimiser proposed nothing, or no
             cost was a finite number.
 
     Example:
@@ -124,19 +124,19 @@ class Problem:
     attribute, it has COCO's name.
 
     Args:
-        cost: returns the costs (n,) of proposals (n, d).
-        space: the box that an optimiser searches.
-        budget: the largest number of evaluations; None for any number.
-        repair: moves infeasible proposals (n, d) before they are evaluated; by default
+        cost: Returns the costs (n,) of proposals (n, d).
+        space: The box that an optimiser searches.
+        budget: The largest number of evaluations; None for any number.
+        repair: Moves infeasible proposals (n, d) before they are evaluated; by default
             they are not moved.
-        noisy: takes proposals (n, d) and the number of evaluations before them, and
+        noisy: Takes proposals (n, d) and the number of evaluations before them, and
             returns the costs (n,) that the optimiser gets; by default these are the
             costs without noise. The best and the trace are always without noise.
-        targets: costs to be reached, in descending order.
-        id: names the problem in messages.
+        targets: Costs to be reached, in descending order.
+        id: Names the problem in messages.
 
     Raises:
-        InputError: the budget is not a whole number above 0.
+        InputError: The budget is not a whole number above 0.
 
     Example:
         >>> import numpy as np
@@ -190,11 +190,10 @@ class Problem:
         returned as an array of the same library.
 
         Raises:
-            ValueError: the shape is wrong, or a number is not finite. Nothing is
+            ValueError: The shape is wrong, or a number is not finite. Nothing is
                 counted.
-            BudgetSpentError: there are more proposals than evaluations left. Nothing is
+            BudgetSpentError: There are more proposals than evaluations left. Nothing is
                 evaluated.
-
         """
         values, back = as_numpy("proposals", proposals)
         checked = self.checked(values)
@@ -270,8 +269,7 @@ class Problem:
         """The best proposal (d,) so far, as it was evaluated.
 
         Raises:
-            ValueError: no proposal has a finite cost yet.
-
+            ValueError: No proposal has a finite cost yet.
         """
         if not self._improvements:
             raise InputError(

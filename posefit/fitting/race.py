@@ -30,13 +30,12 @@ def race(starts: Sequence[Start], search: Search, budget: int) -> list[list[Prob
     """Return the searches from each start that took part, the cheapest start first.
 
     Args:
-        starts: where to search, the likeliest first.
-        search: returns the problem of a start, searched within a number of evaluations.
-        budget: the evaluations of all searches together.
+        starts: Where to search, the likeliest first.
+        search: Returns the problem of a start, searched within a number of evaluations.
+        budget: The evaluations of all searches together.
 
     Returns:
         The problems of each start: its short search, and the long one of a finalist.
-
     """
     short_budget = int(SHORT_SHARE * budget)
     likely = [each for each in starts if each.weight >= MIN_WEIGHT * starts[0].weight]

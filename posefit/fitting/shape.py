@@ -228,7 +228,6 @@ def fit_shape(
         aligned: Whether the places of poses are aligned, for each body that is tried.
         beta: The weight in the cost, see `posefit.silhouette.cost`.
         threads: Number of threads. Does not change the result.
-
     """
 
     def cost(factors: Array) -> Array:

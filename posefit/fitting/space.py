@@ -158,7 +158,6 @@ class SearchSpace:
 
         Raises:
             InputError: The shape is wrong, or a proposal is not finite.
-
         """
         proposals = writeable(proposals)
         d = len(self.centre)

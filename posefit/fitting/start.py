@@ -82,7 +82,6 @@ def starts_in(
         cost: The cost of a proposal for the frame.
         modes: The modes, each with its weight.
         evaluations: What the costs may take, at most.
-
     """
     space = cost.space
     side = min(cost.silhouettes[0].size)
@@ -148,7 +147,6 @@ def posterior_of(poses: Array, places: Array, costs: Array) -> Posterior:
         poses: (n, 66) the pose that each search found.
         places: (n, 3) metres, their roots.
         costs: (n,) their costs. Cheaper poses are likelier.
-
     """
     errors = Recalibration(
         np.full(len(JOINTS), JOINT_ERROR), np.full(ANGLES, ANGLE_ERROR)

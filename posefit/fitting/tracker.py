@@ -309,19 +309,19 @@ class Prediction:
     """The box of a search, its start, and the cost of a pose. SAPSO (4), (6), (7).
 
     Settings:
-        spread (k): standard deviations of the start, as multiples of the predicted
+        spread (k): Standard deviations of the start, as multiples of the predicted
             step, 0 or more. Interpretation S5.
-        floor: their least value, in half-ranges of the box, above 0, so that a still
+        floor: Their least value, in half-ranges of the box, above 0, so that a still
             subject keeps some spread. Interpretation S5.
-        root_range_degrees: range of yaw, pitch and roll to either side of the last
+        root_range_degrees: Range of yaw, pitch and roll to either side of the last
             frame's. Ours.
-        tilt: pitch and roll are "learned" with the latents, or a "box" around upright.
+        tilt: Pitch and roll are "learned" with the latents, or a "box" around upright.
             Default: learned; a box with variant "paper". Interpretation S16.
-        beta: weight of the missed share, 0 to 1; the spilled share has 1 - beta. SAPSO
+        beta: Weight of the missed share, 0 to 1; the spilled share has 1 - beta. SAPSO
             (4).
-        start: name of the start that guesses the first pose if the yaw is unknown,
+        start: Name of the start that guesses the first pose if the yaw is unknown,
             "blind" for none. Default: "lookup".
-        relocalise_gap: in footage, frames of a gap after which several starts search
+        relocalise_gap: In footage, frames of a gap after which several starts search
             all yaws; 0: never. Ours.
         variant: "paper" follows SAPSO's paper to the letter: the step before the latest
             (Interpretation S12), a box of tilts (S16), and a root that turns about x,
@@ -368,7 +368,6 @@ class Predictor:
         prior: The fitted prior.
         prediction: The settings.
         tilt: The tilt, if it has been learned from the task's training already.
-
     """
 
     def __init__(

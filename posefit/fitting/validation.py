@@ -42,7 +42,6 @@ class Checked:
         name: Its name.
         space: The space that an optimiser searches, or None for a prior.
         evaluations: The budget of a search. It must be enough for the first population.
-
     """
 
     def __init__(
@@ -164,7 +163,6 @@ def plugin_errors(
         name: The name of the plugin.
         what: The call.
         passed: Exceptions that are passed on. A ValueError becomes an InputError.
-
     """
     try:
         yield
@@ -242,7 +240,6 @@ def check_prior(prior: Latents, training: Array, skeleton: Skeleton, name: str) 
         training: (T, 63) the joint angles that it has learned from.
         skeleton: The skeleton of their person.
         name: The name of the prior. Messages begin with it.
-
     """
 
     def broken(rule: str) -> BrokenRuleError:

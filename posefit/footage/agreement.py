@@ -35,7 +35,6 @@ def meeting(cameras: Sequence[Camera], middles: Sequence[Array]) -> tuple[Array,
     Returns:
         The point (3,) with the least squared distances from all rays, and its distance
         (n,) from each ray.
-
     """
     positions = [camera.position for camera in cameras]
     # the projection (3, 3) onto the plane across each ray
@@ -96,7 +95,6 @@ def apparent_size(cameras: Sequence[Camera], extents: Extents) -> tuple[float, A
         By how much the rays through the middles miss each other, and how tall (n,) the
         person is in each view, both in the cameras' unit. A height is negative if the
         rays meet behind that camera.
-
     """
     place, away = meeting(cameras, [middle for middle, _ in extents])
     heights = list[float]()
@@ -113,7 +111,6 @@ def disagreement(miss: float, tall: Array, stature: float) -> str | None:
         miss: By how much their rays miss each other, see `apparent_size`.
         tall: (n,) how tall the person seems in each view.
         stature: The person's height. All are in metres.
-
     """
     reasons = (
         "the masks show only parts of the person, or another one, "

@@ -63,7 +63,6 @@ def read_annotations(
 
     Raises:
         InputError: The file is not of this format, or has no such category.
-
     """
     check_size(existing(path), MAX_FILE_BYTES)
     if isinstance(category, int):
@@ -118,7 +117,6 @@ class _Content:
             Each comes with whether it marks a crowd.
         guesses: Which category is taken, and what crowds mean.
         warnings: Which annotations belong to no image.
-
     """
 
     def __init__(self, path: Path, category: str | None) -> None:
@@ -303,7 +301,6 @@ def filled(corners: Array, size: tuple[int, int]) -> Mask:
 
     Raises:
         ValueError: There are fewer than three corners, or some are far outside.
-
     """
     if corners.ndim != 1 or len(corners) < 6 or len(corners) % 2:
         raise ValueError("a polygon needs three corners or more")
@@ -363,7 +360,6 @@ def unrun(shape: Mapping[str, Any], size: tuple[int, int]) -> Mask:
     Raises:
         ValueError: The runs are of another size, or do not fill it.
         KeyError: An entry is missing.
-
     """
     width, height = size
     if [*shape["size"]] != [height, width]:

@@ -54,7 +54,6 @@ def combined(
     Raises:
         InputError: Views and cameras do not fit each other.
         NoPersonError: Several cameras cannot all see one person of this size.
-
     """
     name = Path(views[0].name).stem
     rate, stated = _rate(views, options.fps)
@@ -152,7 +151,6 @@ def _of_one_size(
 
     Raises:
         NoPersonError: The cameras cannot all see one person of this size.
-
     """
     frames = shared_extents(observations)
     if not frames:
@@ -214,7 +212,6 @@ def same_person(
         size: Width and height of the other view's masks.
         persons: The people in the other view.
         filmed: Width and height of the video that those masks were segmented from.
-
     """
     fitted = list[Camera | Calibration]()
     cameras = list[Camera]()
@@ -271,7 +268,6 @@ def _difference(misses: Sequence[float], heights: Sequence[Array]) -> float:
     Returns:
         The typical miss in heights, and the spread of the heights' logarithms, added;
         infinite without any frame.
-
     """
     if not misses:
         return np.inf
@@ -340,7 +336,6 @@ def place_of(
         silhouettes: One per camera; at least one shows the person.
         cameras: One camera, or several.
         stature: The person's height in metres.
-
     """
     seeing = list[Camera]()
     middles = list[Array]()

@@ -44,7 +44,6 @@ def cleaned(
 
     Raises:
         InputError: No frame shows a person.
-
     """
     count = len(view)
     warnings = list(view.warnings)
@@ -138,7 +137,6 @@ def _shows_enough(
         usable: (T,) which frames show a person.
         areas: (T,) of the person, in pixels.
         cut: (T,) in which frames the person touches the edge.
-
     """
     enough = np.ones(len(areas), dtype=bool)
     whole = np.flatnonzero(usable & ~cut)

@@ -43,7 +43,6 @@ class CutWatch:
         Raises:
             NoPersonError: The picture cuts the person in all frames that were looked
                 at, and nobody else moves.
-
         """
         if not self._watching:
             return

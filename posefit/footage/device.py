@@ -20,7 +20,6 @@ def device_of(name: str) -> Device | None:
     Raises:
         InputError: No plugin offers it, or this machine does not have it.
         ImportError: The plugin needs a library that is not installed.
-
     """
     one_of("device", name, (CPU, *registry().offers["device"]))
     if name == CPU:

@@ -66,7 +66,6 @@ def extract(
     Raises:
         InputError: An argument or a file is wrong, no frame shows a person, or the disk
             is full.
-
     """
     target = Path(out)
     check_new(target)

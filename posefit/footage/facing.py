@@ -32,7 +32,6 @@ def facings_on_the_spot(
         middles: (T,) the middle column of each mask, in pixels; NaN if it is empty.
         sides: (T,) the longer side of each mask, in pixels.
         fps: Frames per second.
-
     """
     result = np.array(facings, dtype=np.float64)
     reach = max(round(STAYING_SECONDS * fps), 1)
@@ -56,7 +55,6 @@ def yaws_of(facings: Array | Sequence[float], camera: Camera, fps: float) -> Arr
         facings: (T,) as `Segmenter.facing`.
         camera: The camera that they are relative to.
         fps: Frames per second.
-
     """
     values = np.asarray(facings, dtype=np.float64)
     reach = max(round(MEAN_SECONDS * fps), 1)

@@ -45,7 +45,6 @@ def with_identities(
     Returns:
         A scan that follows the person whom the user chose. By default this is the first
         person, or the one whom `single` shows most often if it does not find the first.
-
     """
     everyone = all_people.scan(progress)
     persons = everyone.people.persons()
@@ -106,7 +105,6 @@ def _without_others(
         parts: The parts of the person who is followed.
         others: The parts of all other people.
         progress: Shows the progress of the pass.
-
     """
 
     def changed(k: int, image: Image) -> Image:

@@ -64,7 +64,6 @@ def read_image(path: str | Path, grey: bool, page: int = 0) -> NDArray[np.uint8]
     Raises:
         InputError: The picture has more than `PIXELS`, or the file is larger than
             `LARGEST_FILE`.
-
     """
     return next(_decoded(Path(path), [page], _grey if grey else _colours), None)
 
@@ -85,7 +84,6 @@ def read_marks(
 
     Raises:
         InputError: As `read_image`.
-
     """
     return _decoded(path, pages, partial(_marks, labelled=labelled))
 

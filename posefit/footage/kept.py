@@ -32,7 +32,6 @@ class KeptFrames:
         Args:
             size: Width and height of the frames.
             wanted: The numbers of the frames to keep; the others are not added.
-
         """
         self.wanted = wanted
         self._shape = (size[1], size[0], 3)

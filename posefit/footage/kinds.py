@@ -166,7 +166,6 @@ def resolve(source: Any) -> Resolved:
     Raises:
         InputError: No reader takes it, a file is missing, or cameras have sources of
             different kinds.
-
     """
     if isinstance(source, Resolved):
         return source
@@ -242,7 +241,6 @@ def first_of(source: Resolved, fps: float | None = None) -> int:
     Args:
         source: The source.
         fps: Frames per second, at which a motion is resampled.
-
     """
     first = 0
     for kind, place in zip(source.kinds, source.places, strict=True):

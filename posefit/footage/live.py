@@ -60,7 +60,6 @@ class Stream:
 
         Raises:
             InputError: The source cannot be opened.
-
         """
         self.name = source
         self.fps = FPS
@@ -204,7 +203,6 @@ def live_views(
 
     Raises:
         InputError: The stream fails, see `Stream`, or its frames differ in size.
-
     """
     images = _of_one_size(stream)
     first = next(images)

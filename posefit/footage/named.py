@@ -28,7 +28,6 @@ def sources_of(source: Any) -> list[Footage]:
 
     Raises:
         InputError: The source is none of these.
-
     """
     if isinstance(source, os.PathLike):
         source = Path(source)

@@ -78,7 +78,6 @@ def numbered(images: Sequence[Path], name: str) -> Numbered:
     Raises:
         InputError: Files have several formats, two files have the same number, or some
             have none. Some of them are probably not masks, or of another camera.
-
     """
     _check_one_kind(images, name)
     # text, number, text, number, ..., text
@@ -231,7 +230,6 @@ def numbered_together(cameras: Sequence[Images]) -> list[Images]:
 
     Raises:
         InputError: The cameras have no number in common.
-
     """
     names = [camera.name for camera in cameras]
     listed = [numbered(camera.files, camera.name) for camera in cameras]

@@ -33,7 +33,6 @@ class Observations(Sequence[Observation]):
             views: One view per camera, starting at the same frame.
             yaws: (T,) about which way the person faces, in radians. NaN if unknown for
                 a frame; None if unknown for all.
-
         """
         self.views = views
         self.yaws = np.empty(0) if yaws is None else yaws

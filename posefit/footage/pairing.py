@@ -67,7 +67,6 @@ def calibrated(
 
     Raises:
         InputError: Cameras and views do not fit each other.
-
     """
     known = listed(cameras)
     views = len(filmed)
@@ -135,7 +134,6 @@ def order_by_name(
 
     Raises:
         InputError: The names can be paired in several ways.
-
     """
     in_order = list(range(len(cameras)))
     names = [camera.name for camera in cameras if isinstance(camera, Calibration)]

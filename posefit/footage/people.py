@@ -194,7 +194,6 @@ class People:
         Args:
             masks: (height, width) of each blob in the frame, the largest first.
             image: The picture, whose colours tell people apart.
-
         """
         self._frame += 1
         frame = self._frame
@@ -299,7 +298,6 @@ class People:
 
         Raises:
             NoPersonError: There are fewer people than the number.
-
         """
         persons = self.persons()
         if not persons:
@@ -431,7 +429,6 @@ def rows_of(
     Args:
         parts: The parts of the person.
         blanks: For each frame, the row to use if it does not show the person.
-
     """
     rows = list[dict[str, Any]]()
     apart = list[dict[str, Any]]()
@@ -454,7 +451,6 @@ def person_indices(persons: Persons, masks: Iterable[Mask]) -> list[int | None]:
     Args:
         persons: The people.
         masks: The mask (height, width) of each frame, from another segmenter.
-
     """
     nobody = -1  # for a mask that shows nobody, until it gets a person
     result = list[int | None]()
@@ -515,7 +511,6 @@ def excluded_mask(
         others: The parts of all other people.
         frame: The frame.
         size: Its width and height.
-
     """
     mask = np.zeros(size[::-1], dtype=bool)
     for other in others:
@@ -549,7 +544,6 @@ def planes_of(
         others: The parts of all other people.
         frame: The frame.
         known: (height, width) the pixels that the picture shows.
-
     """
     mask = np.zeros_like(known)
     unknown = np.zeros_like(known)

@@ -81,7 +81,6 @@ class FrameQuality:
             background: The learned picture of the empty scene, if there is one.
             still: Whether the background must be still. If not, motion outside a mask
                 is not counted.
-
         """
         self._still = still
         self._edges = None if background is None else _edges(background)
@@ -188,7 +187,6 @@ def moved_pixels(
         reach: The person's longer side in pixels. Pixels up to `MOTION_REACH` of it
             around the region are counted.
         slack: Share of `reach` up to which a pixel is at the body.
-
     """
     left, top, right, bottom = box_of(region)
     far = round(MOTION_REACH * reach)
@@ -238,7 +236,6 @@ def verdict(
         method: Name of the segmenter.
         learned: Whether the segmenter learned the background from the video itself, and
             not from a picture of the empty scene.
-
     """
     whole = [row for row in rows if row["area"] and not row["touches_border"]]
     usable = sum(row["usable"] for row in whole)

@@ -31,7 +31,6 @@ def even(times: Array, fps: float) -> tuple[Order, NDArray[np.bool_], float]:
     Returns:
         For each moment its frame, whether that frame was filmed then and is not a
         repetition, and the number of moments per second.
-
     """
     numbers = np.arange(len(times))
     all_filmed = numbers >= 0
@@ -69,7 +68,6 @@ def rate_of(times: Array, off: float, stated: float) -> float:
         times: (T,) when each frame is shown, in seconds.
         off: By how many seconds a time differs at most from even ones.
         stated: The rate that the file states.
-
     """
     intervals = len(times) - 1
     lasted = float(times[-1] - times[0])

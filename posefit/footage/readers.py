@@ -168,7 +168,6 @@ def view_of(
 
     Raises:
         InputError: An array has a wrong shape, type or value, or no frame is usable.
-
     """
     stack = _checked_stack(name, arrays)
     count, height, width = stack.shape

@@ -55,7 +55,6 @@ class Scanner:
 
         Raises:
             InputError: The extraction or the frames do not fit the video.
-
         """
         self.start, self.stop = span(frames, video.count())
         self.how = how
@@ -80,7 +79,6 @@ class Scanner:
             changed: Returns the picture of a frame that the segmenter gets, given the
                 frame's index and its picture.
             watch: Gets each frame's index and its people; it may end the pass.
-
         """
         video = self.video
         size = video.size
@@ -175,7 +173,6 @@ class _Rows:
             blobs: What the segmenter found in it, the largest first.
             people: The people of the frames up to this one. They get their rows.
             present: The people in this one.
-
         """
         known = blobs[0].valid
         empty = Person(np.zeros_like(known), known, 0, 0, 0.0, False)

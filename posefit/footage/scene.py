@@ -91,7 +91,6 @@ def synthetic(
 
     Raises:
         InputError: A camera does not see the person in the first or the last frame.
-
     """
     body = Body.of(motion.skeleton)
     placing: Placing = "given" if cameras else "placed"
@@ -199,7 +198,6 @@ def with_corruption(
         noise: Strength of each corruption by its name, see `corrupted`.
         dropped: Share of the frames that become unusable. The first frame never does.
         seed: Seed of the random numbers.
-
     """
     at = partial(_corrupted, observations, noise, dropped, seed)
     return LazyObservations(len(observations), at)

@@ -63,7 +63,6 @@ class Segmentation:
 
         Raises:
             InputError: The extraction or the frames do not fit the video.
-
         """
         self.video = video
         self.how = how
@@ -91,7 +90,6 @@ class Segmentation:
         Raises:
             NoPersonError: No frame shows a person, or the picture cuts the person in
                 all frames and `refuse_cut` is given.
-
         """
         watch = CutWatch(self._scanner).add if refuse_cut else None
         scan = self._scanner.scan(progress, watch=watch)

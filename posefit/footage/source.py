@@ -56,7 +56,6 @@ def scene_of(
 
     Raises:
         InputError: An option does not fit the source, or no segmenter finds a person.
-
     """
     source = resolve(source)
     options = options or SourceOptions()
@@ -154,7 +153,6 @@ def films_of(source: Resolved, width: int, fps: float | None = None) -> list[Vid
 
     Raises:
         InputError: A film cannot be read, or the rates differ.
-
     """
     films = list[Video]()
     for kind, place in zip(source.kinds, source.places, strict=True):
@@ -185,7 +183,6 @@ def views_of_masks(
 
     Raises:
         InputError: Masks cannot be read, or cameras have no frame in common.
-
     """
     views = list[View]()
     for kind, place in zip(source.kinds, source.places, strict=True):
@@ -328,7 +325,6 @@ def body_of(
     Returns:
         The body, warnings about the file, and what was guessed. A given height replaces
         what both of them are about.
-
     """
     average = Acclaim(built_in.average_skeleton(), 1.0)
     acclaim = average if asf is None else parse_asf(asf, unit)

@@ -60,7 +60,6 @@ def undistorted(
 
     Returns:
         A view with the size of `maps`.
-
     """
     size = (maps[0].shape[1], maps[0].shape[0])
     bits = empty_planes(len(view), size)
@@ -104,7 +103,6 @@ def straightening(
 
     Raises:
         InputError: The masks are not from this camera.
-
     """
     notes = list[str]()
     calibration = Calibration.of(known, "") if isinstance(known, Camera) else known

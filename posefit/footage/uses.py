@@ -43,7 +43,6 @@ def check_used(medium: Medium, options: SourceOptions) -> None:
     Args:
         medium: The kind of source.
         options: The options; None if not given.
-
     """
     for name, use in _USED_FOR.items():
         value = getattr(options, name)

@@ -98,7 +98,6 @@ class ValueCounts:
 
         Raises:
             InputError: There are several labels, or the given one does not occur.
-
         """
         if label is not None:
             return self._labelled(label, name), []

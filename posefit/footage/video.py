@@ -74,7 +74,6 @@ class Video:
 
         Raises:
             InputError: The file is missing, cannot be read, or has no frame.
-
         """
         path = Path(path)
         head = _read_head(path)
@@ -403,7 +402,6 @@ def _moments(
         filmed: Width and height of its frames.
         size: Width and height to which they are scaled.
         kept: Chooses and keeps frames.
-
     """
     times = list[float]()
     # a second core decodes the next frames while this one is scaled and kept

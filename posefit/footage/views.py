@@ -155,7 +155,6 @@ def together(views: Sequence[View]) -> list[View]:
     Raises:
         InputError: The cameras have no frame in common, or they begin at different
             frames and not all of them state numbers.
-
     """
     starts = [int(view.numbers[0]) for view in views]
     stops = [int(view.numbers[-1]) + 1 for view in views]
@@ -215,7 +214,6 @@ def empty_planes(count: int, size: tuple[int, int]) -> Planes:
 
     Raises:
         InputError: The planes need more memory than this process may use.
-
     """
     octets = (size[0] * size[1] + 7) // 8
     most = allowed_bytes()
@@ -292,7 +290,6 @@ def beyond(frames: Range, first: int, count: int) -> str:
         frames: The range, as for `span`.
         first: Number of the first frame that is used.
         count: How many frames are used.
-
     """
     start, stop = frames
     early = start is not None and 0 <= start < first
@@ -322,7 +319,6 @@ def span(frames: Range, count: int, first: int = 0) -> tuple[int, int]:
 
     Raises:
         InputError: The range contains no frame.
-
     """
     ends = list[int | None]()
     for end in frames:

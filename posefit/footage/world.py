@@ -41,7 +41,6 @@ def world_of(
 
     Raises:
         InputError: A unit is given for a file that states another one.
-
     """
     calibrations = [camera for camera in known if isinstance(camera, Calibration)]
     guesses = dict[str, str]()
@@ -97,7 +96,6 @@ def unit_of_heights(ratio: float) -> Unit:
 
     Args:
         ratio: The person's height in that unit, over their height in metres.
-
     """
     return min(GUESSED_UNITS, key=lambda unit: abs(np.log(ratio * METRES[unit])))
 
@@ -134,7 +132,6 @@ def unit_by_height(
             unit may be any length if no usual one fits.
         metres: The unit guessed before, in metres.
         stature: The person's height in metres.
-
     """
     if not any(is_open(camera) for camera in known):
         return _Fitted(1.0, "")

@@ -98,7 +98,6 @@ class Body:
         Args:
             lengths: Factors of the bones' lengths: one number, or one per bone (26,).
             girths: Factors of the radii: one number, or one per bone (26,).
-
         """
         lengths = np.broadcast_to(lengths, len(BONES))
         girths = np.broadcast_to(girths, len(BONES))

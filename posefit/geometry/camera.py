@@ -117,7 +117,6 @@ class Camera:
 
         Raises:
             InputError: The distance or the field of view is out of range.
-
         """
         if not (math.isfinite(distance) and distance >= 0.0):
             raise InputError(f"distance must be 0 or more metres, got {distance}")
@@ -166,7 +165,6 @@ class Camera:
         Raises:
             InputError: `fx` is less than a tenth of the width, so that it is probably
                 in millimetres.
-
         """
         if 0.0 < fx < 0.1 * width:
             raise InputError(
@@ -197,7 +195,6 @@ class Camera:
 
         Returns:
             The camera.
-
         """
         points = np.asarray(points, dtype=np.float64)
         radii = np.asarray(radii, dtype=np.float64)
@@ -272,7 +269,6 @@ class Camera:
 
         Raises:
             InputError: The text is not valid; the message names the key.
-
         """
         if isinstance(path, str) and path.lstrip().startswith("{"):
             text = path

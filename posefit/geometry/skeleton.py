@@ -228,7 +228,6 @@ class Skeleton:
         Returns:
             The frames (n, 27, 4, 3), each three axes and an origin, and the sines and
             the cosines (n, 66) of the angles.
-
         """
         frames = np.empty((len(poses), len(JOINTS), 4, 3))
         sines = np.empty((len(poses), ANGLES))
@@ -256,7 +255,6 @@ class Skeleton:
 
         Raises:
             InputError: A shape does not fit.
-
         """
         poses = np.asarray(poses, dtype=np.float64)
         if poses.ndim < 1 or poses.shape[-1] != ANGLES:

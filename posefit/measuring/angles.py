@@ -77,8 +77,8 @@ def joint_coordinates(proximal: Array, distal: Array) -> Array:
     both others, and about the distal segment's Y: forwards, inwards, turned inwards.
 
     Args:
-        proximal: axes (..., 3, 3) of a segment of the right side.
-        distal: axes (..., 3, 3) of the next segment.
+        proximal: Axes (..., 3, 3) of a segment of the right side.
+        distal: Axes (..., 3, 3) of the next segment.
     """
     relative = np.swapaxes(proximal, -1, -2) @ distal
     return angles_about((2, 0, 1), relative)  # GROOD1983 (joint coordinate system)
@@ -88,9 +88,9 @@ def joint_angles(joint: str, proximal: Array, distal: Array) -> Array:
     """Return the angles (..., 3) of a joint of the right side, in radians.
 
     Args:
-        joint: a key of `MEANINGS`, which also has the order of the angles.
-        proximal: axes (..., 3, 3) of the segment above the joint.
-        distal: axes (..., 3, 3) of the segment below it.
+        joint: A key of `MEANINGS`, which also has the order of the angles.
+        proximal: Axes (..., 3, 3) of the segment above the joint.
+        distal: Axes (..., 3, 3) of the segment below it.
     """
     if joint == "shoulder":
         return shoulder_angles(proximal, distal)
@@ -108,8 +108,8 @@ def shoulder_angles(thorax: Array, upper_arm: Array) -> Array:
     straight down or points straight up, the whole turn is reported as rotation.
 
     Args:
-        thorax: axes (..., 3, 3).
-        upper_arm: axes (..., 3, 3).
+        thorax: Axes (..., 3, 3).
+        upper_arm: Axes (..., 3, 3).
     """
     relative = np.swapaxes(thorax, -1, -2) @ upper_arm
     level = np.hypot(relative[..., 1, 0], relative[..., 1, 2])
@@ -131,8 +131,8 @@ def clinical_angles(skeleton: Skeleton, poses: Array) -> dict[str, Array]:
     shoulder, such poses are an arm that hangs straight down or points straight up.
 
     Args:
-        skeleton: the skeleton.
-        poses: successive poses (T, 66).
+        skeleton: The skeleton.
+        poses: Successive poses (T, 66).
 
     Returns:
         The angles (T,) in degrees by name.

@@ -35,10 +35,10 @@ def write_c3d(
     """Write the 27 joints of every frame as points, y up, under the names of `PLACES`.
 
     Args:
-        path: the file.
-        motion: the motion.
-        blank: numbers of frames in which all points are unobserved.
-        gait: its strikes and toe-offs become the file's events, the first 255 of them.
+        path: The file.
+        motion: The motion.
+        blank: Numbers of frames in which all points are unobserved.
+        gait: Its strikes and toe-offs become the file's events, the first 255 of them.
     """
     joints = motion.joints * MILLIMETRES
     residuals = np.zeros((*joints.shape[:2], 1))

@@ -33,12 +33,12 @@ class GaitEvents:
     """Times of events in frames, counted from 0 and with fractions, and the path.
 
     Attributes:
-        strikes: times of initial contact, by side.
-        offs: times of toe off, by side.
-        heading: unit vector (T, 2) of x and z that the pelvis faces along, without its
+        strikes: Times of initial contact, by side.
+        offs: Times of toe off, by side.
+        heading: Unit vector (T, 2) of x and z that the pelvis faces along, without its
             sway.
-        pelvis: place (T, 2) in metres.
-        ankles: places (T, 2) in metres, by side.
+        pelvis: Place (T, 2) in metres.
+        ankles: Places (T, 2) in metres, by side.
     """
 
     strikes: dict[str, Array]
@@ -54,7 +54,7 @@ def gait_events(motion: Motion) -> GaitEvents:
     There are no events if the feet do not swing.
 
     Raises:
-        InputError: the motion has too few frames per second.
+        InputError: The motion has too few frames per second.
     """
     if motion.fps < MIN_FPS:
         raise InputError(
@@ -86,9 +86,9 @@ def low_pass(series: Array, cutoff: float, fps: float) -> Array:
     reflection, which keeps an even pace.
 
     Args:
-        series: values in frames.
-        cutoff: frequency in hertz of which 0.71 of the amplitude is left.
-        fps: frames per second.
+        series: Values in frames.
+        cutoff: Frequency in hertz of which 0.71 of the amplitude is left.
+        fps: Frames per second.
     """
     width = np.sqrt(np.log(2.0)) / (2.0 * np.pi * cutoff) * fps  # frames
     reach = min(int(4.0 * width) + 1, len(series) - 1)

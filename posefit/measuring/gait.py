@@ -56,14 +56,14 @@ class Step:
 
     Attributes:
         foot: "left" or "right".
-        strike_seconds: time of the strike.
-        toe_off_seconds: time of the next toe off.
-        step_seconds: duration of the step.
-        step_length: from the other ankle at its strike, along the way the person faces.
-        step_width: between both ankles at the strike, across the way.
-        stride_seconds: duration of the stride.
-        stride_length: from this strike to the foot's next one.
-        stance_share: share of the stride in which the foot is on the ground.
+        strike_seconds: Time of the strike.
+        toe_off_seconds: Time of the next toe off.
+        step_seconds: Duration of the step.
+        step_length: From the other ankle at its strike, along the way the person faces.
+        step_width: Between both ankles at the strike, across the way.
+        stride_seconds: Duration of the stride.
+        stride_length: From this strike to the foot's next one.
+        stance_share: Share of the stride in which the foot is on the ground.
     """
 
     foot: str
@@ -99,17 +99,17 @@ class Gait:
     stride is complete.
 
     Attributes:
-        steps: every strike, with its measures.
-        why: why it is not a walk; empty if it is one.
-        why_no_lengths: why lengths and speed are None; empty if they are known.
-        left: means of the left foot.
-        right: means of the right foot.
-        cadence: steps per minute.
-        speed: metres per second.
+        steps: Every strike, with its measures.
+        why: Why it is not a walk; empty if it is one.
+        why_no_lengths: Why lengths and speed are None; empty if they are known.
+        left: Means of the left foot.
+        right: Means of the right foot.
+        cadence: Steps per minute.
+        speed: Metres per second.
         step_length: metres.
         stride_length: metres.
         step_width: metres.
-        stance_share: share of a stride.
+        stance_share: Share of a stride.
     """
 
     steps: list[Step] = field(default_factory=list, repr=False)
@@ -138,8 +138,8 @@ def gait_of(motion: Motion, unknown: Collection[int] = ()) -> Gait:
     """Return the gait of a motion.
 
     Args:
-        motion: the motion.
-        unknown: numbers of frames to ignore, such as held or lost ones.
+        motion: The motion.
+        unknown: Numbers of frames to ignore, such as held or lost ones.
 
     Returns:
         The gait, with `why` if it has no figures.
@@ -316,11 +316,11 @@ def _why_not(
     """Return why a motion is not a walk, or "" if it is one.
 
     Args:
-        motion: the motion.
-        events: its events.
-        steps: its steps.
-        speed: forwards, in metres per second.
-        known: seconds that are known.
+        motion: The motion.
+        events: Its events.
+        steps: Its steps.
+        speed: Forwards, in metres per second.
+        known: Seconds that are known.
     """
     strikes = sum(len(events.strikes[side]) for side in SIDES)
     if strikes <= MIN_STEPS:
@@ -385,9 +385,9 @@ def stride_curves(motion: Motion, gait: Gait, angle: str) -> dict[str, Array]:
     """Return an angle over the whole strides of each foot.
 
     Args:
-        motion: the motion.
-        gait: its gait.
-        angle: a name of `clinical_angles` without the side.
+        motion: The motion.
+        gait: Its gait.
+        angle: A name of `clinical_angles` without the side.
 
     Returns:
         Degrees (strides, 101) by side.
@@ -415,8 +415,8 @@ def walks_backwards(motion: Motion, unknown: Collection[int] = ()) -> NDArray[np
     length of a leg are not a walk: the hips of a person who squats move back, too.
 
     Args:
-        motion: the motion.
-        unknown: numbers of frames to ignore.
+        motion: The motion.
+        unknown: Numbers of frames to ignore.
     """
     count = len(motion)
     half = max(round(0.5 * TRAVEL_SECONDS * motion.fps), 1)

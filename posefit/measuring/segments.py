@@ -41,8 +41,8 @@ def segment_rotations(skeleton: Skeleton, poses: Array) -> dict[str, Array]:
     `upper_arm` and `forearm`. X, Y and Z are the columns of (T, 3, 3).
 
     Args:
-        skeleton: the skeleton.
-        poses: poses (T, 66).
+        skeleton: The skeleton.
+        poses: Poses (T, 66).
     """
     turned = bone_rotations(skeleton, poses)
 

@@ -22,7 +22,7 @@ def import_pandas() -> Any:
     """Return the module pandas.
 
     Raises:
-        ImportError: it is not installed; the message says how to install it.
+        ImportError: It is not installed; the message says how to install it.
     """
     try:
         return importlib.import_module("pandas")

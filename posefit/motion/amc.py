@@ -49,14 +49,14 @@ def read_clip(
     """Return the motion of an .amc file on the skeleton of its .asf file.
 
     Args:
-        asf: path of the skeleton.
-        amc: path of the motion.
-        fps: frames per second, by default the file's own rate, or else CMU's.
-        unit: length unit of both files, by default as stated in the .asf.
-        up: axis of the world that points up, y by default.
+        asf: Path of the skeleton.
+        amc: Path of the motion.
+        fps: Frames per second, by default the file's own rate, or else CMU's.
+        unit: Length unit of both files, by default as stated in the .asf.
+        up: Axis of the world that points up, y by default.
 
     Raises:
-        InputError: a file is invalid; the message has its name and the line.
+        InputError: A file is invalid; the message has its name and the line.
     """
     acclaim = parse_asf(asf, unit)
     motion = read_amc(amc, acclaim.skeleton, fps=fps, metres_per_unit=acclaim.metres)
@@ -79,15 +79,15 @@ def read_amc(
     along time.
 
     Args:
-        path: the file.
-        skeleton: the skeleton that the file's channels belong to.
-        fps: frames per second. By default the rate that posefit states in its own
+        path: The file.
+        skeleton: The skeleton that the file's channels belong to.
+        fps: Frames per second. By default the rate that posefit states in its own
             files, or else CMU's, which is noted.
-        metres_per_unit: scale of the root's translation; `read_clip` takes it from the
+        metres_per_unit: Scale of the root's translation; `read_clip` takes it from the
             .asf file.
 
     Raises:
-        InputError: the file is invalid; the message has its name and the line.
+        InputError: The file is invalid; the message has its name and the line.
     """
     path = Path(path)
     check_size(path, SIZE_LIMIT)
@@ -128,7 +128,6 @@ def doubtful_angles(angles: Array, *, radians: bool) -> str:
     Args:
         angles: The angles (T, n) as a file has them.
         radians: Whether the file says that they are radians.
-
     """
     largest = float(np.abs(angles).max(initial=0.0))
     if radians and largest > FULL_TURN:
@@ -244,7 +243,7 @@ def write_amc(path: str | Path, motion: Motion) -> None:
     rate. Channels that a pose does not contain, such as fingers, are written as 0.
 
     Raises:
-        InputError: the motion turns a joint about an axis for which the skeleton has no
+        InputError: The motion turns a joint about an axis for which the skeleton has no
             channel.
     """
     lost = np.abs(motion.poses[:, ~motion.skeleton.free]).max(initial=0.0)

@@ -70,11 +70,11 @@ def parse_asf(path: str | Path, unit: Unit | None = None) -> Acclaim:
     of `posefit.geometry.skeleton.BONES` are kept in `channels` only.
 
     Args:
-        path: the file.
-        unit: length unit of the file, by default as stated in it.
+        path: The file.
+        unit: Length unit of the file, by default as stated in it.
 
     Raises:
-        InputError: the file is not an Acclaim skeleton with the 26 bones; the message
+        InputError: The file is not an Acclaim skeleton with the 26 bones; the message
             has its name and the line.
     """
     path = Path(path)

@@ -67,7 +67,7 @@ def person_of(style: str) -> str:
     """Return the person whose clip a style was fitted to, by the database's number.
 
     Args:
-        style: such as `walk-a`, not the mean of a kind's styles.
+        style: Such as `walk-a`, not the mean of a kind's styles.
     """
     clip: str = _stored()["motions"][style]["source"]
     return clip.partition("_")[0]
@@ -111,14 +111,14 @@ def motion(
     is thick; a mean of styles may be 2 cm off.
 
     Args:
-        name: one of `names()`.
-        frames: number of frames.
-        fps: frames per second.
-        speed: factor of the cadence and of the speed over the ground.
-        phase: where in its cycle the motion starts, in cycles.
+        name: One of `names()`.
+        frames: Number of frames.
+        fps: Frames per second.
+        speed: Factor of the cadence and of the speed over the ground.
+        phase: Where in its cycle the motion starts, in cycles.
 
     Raises:
-        InputError: the name is unknown, or a number is invalid.
+        InputError: The name is unknown, or a number is invalid.
     """
     angles, series, period, pace = _model(name)
     if (

@@ -87,14 +87,14 @@ def read_bvh(
     OFFSET is not added. The motion's `notes` list the guesses.
 
     Args:
-        path: the file.
-        unit: its length unit, by default the unit in which the person has a plausible
+        path: The file.
+        unit: Its length unit, by default the unit in which the person has a plausible
             stature.
-        up: the world's axis that points up, by default the axis along which the person
+        up: The world's axis that points up, by default the axis along which the person
             stands.
 
     Raises:
-        InputError: the file is not a motion of a person; the message has its name.
+        InputError: The file is not a motion of a person; the message has its name.
     """
     path = Path(path)
     known = None if unit is None else metres_of(unit)
@@ -209,7 +209,7 @@ def _parsed(path: Path) -> tuple[list[_Node], Array, tuple[float, float]]:
     """Return a file's nodes, values (T, channels), and frame time and rate.
 
     Raises:
-        InputError: the file is not a BVH file; the message has the line.
+        InputError: The file is not a BVH file; the message has the line.
     """
     lines = lines_of(path, LONGEST_LINE)
     nodes, width = _hierarchy(lines)
@@ -357,7 +357,7 @@ def _rig(nodes: Sequence[_Node], values: Array) -> Rig:
     """Return the joints of a file, at rest and in each frame.
 
     Raises:
-        InputError: they are not the joints of a person.
+        InputError: They are not the joints of a person.
     """
     names = [node.name for node in nodes]
     parents = [node.parent for node in nodes]

@@ -31,11 +31,11 @@ class FileOptions(NamedTuple):
     """What motion files do not state, or state wrongly.
 
     Attributes:
-        asf: skeleton of an .amc file; None for the only .asf file in its folder.
-        unit: length unit; None to recognise it.
-        up: axis that points up; None for y, or in a .bvh file for the axis along which
+        asf: Skeleton of an .amc file; None for the only .asf file in its folder.
+        unit: Length unit; None to recognise it.
+        up: Axis that points up; None for y, or in a .bvh file for the axis along which
             the person stands.
-        rate: frames per second of an .amc file; None for the stated rate, or 120.
+        rate: Frames per second of an .amc file; None for the stated rate, or 120.
     """
 
     asf: str | Path | None = None
@@ -53,8 +53,8 @@ class SourceClip:
 
     Attributes:
         motion: `clip.motion(fps)` makes the motion.
-        poses: how many poses are stored.
-        fps: rate of the stored poses; None for a built-in motion, which has the same
+        poses: How many poses are stored.
+        fps: Rate of the stored poses; None for a built-in motion, which has the same
             number of poses at any rate.
     """
 
@@ -73,11 +73,11 @@ def clip_of(source: Source, stated: FileOptions = RECOGNISED) -> SourceClip:
     """Return the clip that a source names. A file is read once, now.
 
     Args:
-        source: a built-in or recorded motion's name, an .amc or .bvh file, or a motion.
-        stated: information that the file lacks.
+        source: A built-in or recorded motion's name, an .amc or .bvh file, or a motion.
+        stated: Information that the file lacks.
 
     Raises:
-        InputError: there is no such motion.
+        InputError: There is no such motion.
     """
     if source in built_in.names():
         name = str(source)
@@ -132,15 +132,15 @@ def load_motion(
     """Return the motion that a source names, at a rate.
 
     Args:
-        source: a built-in or recorded motion's name, an .amc or .bvh file, or a motion.
-        fps: frames per second.
-        stated: information that the file lacks.
+        source: A built-in or recorded motion's name, an .amc or .bvh file, or a motion.
+        fps: Frames per second.
+        stated: Information that the file lacks.
 
     Returns:
         The motion.
 
     Raises:
-        InputError: there is no such motion, or unit or up is given for a source that is
+        InputError: There is no such motion, or unit or up is given for a source that is
             not a file.
 
     Example:
@@ -185,15 +185,15 @@ def training_clips(
     """Return the clips that sources name.
 
     Args:
-        sources: each is what `clip_of` takes; or a folder of .amc files with their
+        sources: Each is what `clip_of` takes; or a folder of .amc files with their
             .asf, or of .bvh files; or `library` for all recorded motions,
             `library:02,16` for some people's, `library:-16` for all but some people's.
-        stated: information that the files lack.
-        followed: the motion that is followed. A folder and the library are used
+        stated: Information that the files lack.
+        followed: The motion that is followed. A folder and the library are used
             without it.
 
     Raises:
-        InputError: there is no such motion, none is left, or the motions would take
+        InputError: There is no such motion, none is left, or the motions would take
             more memory than this process may use.
     """
     clips = []
@@ -213,7 +213,7 @@ def training_motions(clips: Sequence[SourceClip], fps: float) -> list[Motion]:
     """Return the motions of clips at a rate.
 
     Raises:
-        InputError: they would take more memory than this process may use.
+        InputError: They would take more memory than this process may use.
     """
     _check_memory(sum(clip.count(fps) for clip in clips), fps, allowed_bytes())
     return [clip.motion(fps) for clip in clips]

@@ -54,9 +54,9 @@ def write_glb(path: str | Path, motion: Motion, radii: Array) -> None:
     """Write a motion of a body as a .glb file.
 
     Args:
-        path: the file.
-        motion: the motion.
-        radii: radii (26, 2) of the bones' cones at their two ends, in metres.
+        path: The file.
+        motion: The motion.
+        radii: Radii (26, 2) of the bones' cones at their two ends, in metres.
     """
     skeleton = motion.skeleton
     data = _Buffer()
@@ -198,8 +198,8 @@ class _Buffer:
         Args:
             values: Vectors (n, k), or single values (n,). Whole numbers are stored with
                 16 bits, others with 32.
-            target: glTF's number for the use, or None.
-            bounds: whether to state the smallest and the largest values.
+            target: GlTF's number for the use, or None.
+            bounds: Whether to state the smallest and the largest values.
         """
         whole = np.issubdtype(values.dtype, np.integer)
         raw = values.astype("<u2" if whole else "<f4")

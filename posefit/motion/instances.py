@@ -54,8 +54,8 @@ def generator(stream: Stream, *numbers: int) -> np.random.Generator:
     """Return the random generator of an instance.
 
     Args:
-        stream: a row of the table above.
-        numbers: the instance's number, for a suite after the function's.
+        stream: A row of the table above.
+        numbers: The instance's number, for a suite after the function's.
     """
     return np.random.default_rng([RNG_STREAMS[stream], *numbers])
 
@@ -64,7 +64,7 @@ def instance_number(number: object) -> int:
     """Return the number of an instance as an int.
 
     Raises:
-        InputError: there is no such instance.
+        InputError: There is no such instance.
     """
     last = INSTANCES[-1]
     if isinstance(number, bool) or not isinstance(number, int | np.integer):
@@ -81,10 +81,10 @@ class Variation:
     """How an instance differs from the motion itself.
 
     Attributes:
-        speed: factor of the motion's speed.
-        phase: where in its cycle the motion begins, 0 to 1.
-        turn_degrees: turn of all cameras about the person.
-        start: where in a file the frames begin: 0 at its start, 1 as late as possible.
+        speed: Factor of the motion's speed.
+        phase: Where in its cycle the motion begins, 0 to 1.
+        turn_degrees: Turn of all cameras about the person.
+        start: Where in a file the frames begin: 0 at its start, 1 as late as possible.
     """
 
     speed: float
@@ -118,13 +118,13 @@ def motion_of_instance(
     """Return frames of an instance of a motion.
 
     Args:
-        source: name of a built-in motion, a file or a motion.
-        number: the instance's number.
-        frames: how many frames.
-        fps: frames per second.
+        source: Name of a built-in motion, a file or a motion.
+        number: The instance's number.
+        frames: How many frames.
+        fps: Frames per second.
 
     Raises:
-        InputError: a file has fewer frames.
+        InputError: A file has fewer frames.
     """
     varied = variation(number)
     if isinstance(source, str) and source in built_in.names():

@@ -116,13 +116,13 @@ class Joints(NamedTuple):
     """Which nodes of a tree are a person's joints.
 
     Attributes:
-        limbs: nodes by side and joint, such as ("left", "thigh"); at least `NEEDED`.
-        hips: the node from which the legs start.
-        chest: the node from which arms and head start.
-        spine: nodes between the hips and the joint that carries the neck, which is
+        limbs: Nodes by side and joint, such as ("left", "thigh"); at least `NEEDED`.
+        hips: The node from which the legs start.
+        chest: The node from which arms and head start.
+        spine: Nodes between the hips and the joint that carries the neck, which is
             the last one.
-        neck: nodes from the base of the neck up to the head, which is not included.
-        head: the head's node, or None.
+        neck: Nodes from the base of the neck up to the head, which is not included.
+        head: The head's node, or None.
     """
 
     limbs: Mapping[tuple[str, str], int]
@@ -137,8 +137,8 @@ def joints_of(names: Sequence[str], parents: Sequence[int]) -> Joints | list[str
     """Return a person's joints in a tree, or the names of missing joints.
 
     Args:
-        names: names of the nodes, "" for the end of a bone without a further joint.
-        parents: their parents, which come before them; -1 for a root.
+        names: Names of the nodes, "" for the end of a bone without a further joint.
+        parents: Their parents, which come before them; -1 for a root.
 
     Returns:
         The joints, or a list of missing ones.

@@ -31,8 +31,8 @@ class Line(NamedTuple):
         """Return the error of this line.
 
         Args:
-            expected: what should be there.
-            got: the actual text, by default the whole line.
+            expected: What should be there.
+            got: The actual text, by default the whole line.
         """
         if got is None:
             if self.words:
@@ -48,7 +48,7 @@ class Line(NamedTuple):
         """Return the `count` numbers after the first word.
 
         Raises:
-            InputError: there are more or fewer, or one is not a number, or too large.
+            InputError: There are more or fewer, or one is not a number, or too large.
         """
         first = quoted_words(self.words[:1])
         words = self.words[1:]
@@ -70,7 +70,7 @@ def lines_of(path: Path, longest: int) -> Iterator[Line]:
     """Yield the lines of a file that have words, and an empty one at the end.
 
     Raises:
-        InputError: a line has more than `longest` bytes.
+        InputError: A line has more than `longest` bytes.
     """
     number = 0
     with path.open("rb") as file:

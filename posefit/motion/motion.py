@@ -28,17 +28,17 @@ class Motion:
     """Poses of one skeleton at a constant rate. Arrays are read-only copies.
 
     Attributes:
-        name: of the clip.
-        skeleton: the skeleton that the poses are of.
-        poses: angles (T, 66) in radians, unwrapped along time by the readers.
-        translations: root joint (T, 3) in the world, in metres.
-        fps: frames per second.
-        first: number of the first frame, in the footage or in the longer motion that
+        name: Of the clip.
+        skeleton: The skeleton that the poses are of.
+        poses: Angles (T, 66) in radians, unwrapped along time by the readers.
+        translations: Root joint (T, 3) in the world, in metres.
+        fps: Frames per second.
+        first: Number of the first frame, in the footage or in the longer motion that
             this one was cut from.
-        notes: the guesses that were made when a file was read.
+        notes: The guesses that were made when a file was read.
 
     Raises:
-        InputError: an array has a wrong shape or is not finite, or the rate is not
+        InputError: An array has a wrong shape or is not finite, or the rate is not
             allowed.
 
     Example:
@@ -85,7 +85,7 @@ class Motion:
         """Return frames `start` to `stop` - 1 as a motion.
 
         Raises:
-            InputError: that leaves the clip, or is empty.
+            InputError: That leaves the clip, or is empty.
         """
         if not 0 <= start < stop <= len(self):
             raise InputError(
@@ -147,7 +147,7 @@ class Motion:
         the new rate.
 
         Raises:
-            InputError: the rate is not allowed, or gives too many frames.
+            InputError: The rate is not allowed, or gives too many frames.
         """
         fps = _rate(fps)
         ratio = self.fps / fps

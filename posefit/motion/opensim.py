@@ -73,9 +73,9 @@ def write_osim(path: str | Path, body: Body, markers: Sequence[str]) -> None:
     """Write the model of a body as an .osim file.
 
     Args:
-        path: the file.
-        body: skeleton and radii.
-        markers: names (27,) of the markers at the joints.
+        path: The file.
+        body: Skeleton and radii.
+        markers: Names (27,) of the markers at the joints.
     """
     skeleton = body.skeleton
     document = Element("OpenSimDocument", Version=VERSION)
@@ -182,12 +182,12 @@ def _joint(
     """Return a joint between a parent's frame and a body's origin.
 
     Args:
-        joints: where to add it.
+        joints: Where to add it.
         kind: OpenSim's kind of joint.
-        name: of the body.
-        parent: path of the parent's frame.
-        at: where in the parent's frame it is (3,).
-        axes: axes (3, 3) of its angles.
+        name: Of the body.
+        parent: Path of the parent's frame.
+        at: Where in the parent's frame it is (3,).
+        axes: Axes (3, 3) of its angles.
     """
     joint = SubElement(joints, kind, name=f"{name}_joint")
     SubElement(joint, "socket_parent_frame").text = f"{name}_parent"
@@ -208,11 +208,11 @@ def _mobile(
     """Give a joint its coordinates.
 
     Args:
-        joint: the joint.
-        turns: names of its turns, the outermost first; "" for a fixed axis.
-        axes: axes (3, 3) of the turns.
-        moves: names of its translations along x, y, z; "" for a fixed axis.
-        skeleton: has the limits of the angles.
+        joint: The joint.
+        turns: Names of its turns, the outermost first; "" for a fixed axis.
+        axes: Axes (3, 3) of the turns.
+        moves: Names of its translations along x, y, z; "" for a fixed axis.
+        skeleton: Has the limits of the angles.
     """
     listed = SubElement(joint, "coordinates")
     for name in (*turns, *moves):

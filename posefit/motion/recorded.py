@@ -44,11 +44,11 @@ class RecordedClip:
     """The stored poses of one clip, in order. Arrays are read-only.
 
     Attributes:
-        name: subject and clip, such as 16_15.
-        subject: the person.
-        skeleton: of the person.
-        steps: stored whole numbers (K, 69), of angles and of the root joint.
-        times: frames (K,) since the first pose, at 30 frames per second.
+        name: Subject and clip, such as 16_15.
+        subject: The person.
+        skeleton: Of the person.
+        steps: Stored whole numbers (K, 69), of angles and of the root joint.
+        times: Frames (K,) since the first pose, at 30 frames per second.
     """
 
     name: str
@@ -87,7 +87,7 @@ class RecordedClip:
         held.
 
         Args:
-            frames: frames (n,) since the first pose, at 30 frames per second.
+            frames: Frames (n,) since the first pose, at 30 frames per second.
         """
         frames = np.minimum(frames, self.times[-1])
         second_last = max(len(self) - 2, 0)
@@ -150,7 +150,7 @@ def clip(name: str) -> RecordedClip:
     """Return the clip with a name such as 16_15.
 
     Raises:
-        InputError: there is no such clip.
+        InputError: There is no such clip.
     """
     if not is_recorded(name):
         raise InputError(
@@ -165,11 +165,11 @@ def clips(
     """Return the clips of some people.
 
     Args:
-        only: the people, all by default.
-        without: people to leave out.
+        only: The people, all by default.
+        without: People to leave out.
 
     Raises:
-        InputError: a person is not in the library, or nobody is left.
+        InputError: A person is not in the library, or nobody is left.
     """
     people = subjects()
     only = tuple(only) or people
@@ -204,7 +204,7 @@ def named(name: str) -> Sequence[RecordedClip]:
             some.
 
     Raises:
-        InputError: a person is not in the library, or nobody is left.
+        InputError: A person is not in the library, or nobody is left.
     """
     _, colon, listed = name.partition(":")
     if colon:

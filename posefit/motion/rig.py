@@ -74,11 +74,11 @@ class Rig:
     """A tree with a person's joints, at rest and in motion.
 
     Attributes:
-        names: of the nodes, "" for the end of a bone without a further joint.
-        parents: of the nodes, -1 for a root.
-        joints: which nodes are the person's joints.
-        rest: turns (nodes, 3, 3) and places (nodes, 3) at rest.
-        moving: turns (nodes, T, 3, 3) and places (nodes, T, 3) in the frames.
+        names: Of the nodes, "" for the end of a bone without a further joint.
+        parents: Of the nodes, -1 for a root.
+        joints: Which nodes are the person's joints.
+        rest: Turns (nodes, 3, 3) and places (nodes, 3) at rest.
+        moving: Turns (nodes, T, 3, 3) and places (nodes, T, 3) in the frames.
     """
 
     names: Sequence[str]
@@ -144,11 +144,11 @@ class Retargeted:
     """A rig's motion, converted to a `Skeleton`, in the rig's unit.
 
     Attributes:
-        skeleton: with the rig's bones.
-        poses: angles (T, 66).
-        places: root joint (T, 3).
-        filled: names of the bones that the rig does not have.
-        off: greatest distance of a joint from its place in the rig.
+        skeleton: With the rig's bones.
+        poses: Angles (T, 66).
+        places: Root joint (T, 3).
+        filled: Names of the bones that the rig does not have.
+        off: Greatest distance of a joint from its place in the rig.
     """
 
     skeleton: Skeleton
@@ -188,10 +188,10 @@ class _Rest(NamedTuple):
     """The pose of a rig that corresponds to CMU's rest.
 
     Attributes:
-        own: whether it is the rig's own rest pose.
-        turns: of the nodes (nodes, 3, 3).
-        places: of the nodes (nodes, 3).
-        root: left, up and ahead as columns (3, 3), in the root's node.
+        own: Whether it is the rig's own rest pose.
+        turns: Of the nodes (nodes, 3, 3).
+        places: Of the nodes (nodes, 3).
+        root: Left, up and ahead as columns (3, 3), in the root's node.
     """
 
     own: bool
@@ -211,11 +211,11 @@ def retargeted(rig: Rig, up: Array) -> Retargeted:
     """Return a rig's motion on a skeleton with its bones.
 
     Args:
-        rig: the rig.
-        up: turn (3, 3) of the world after which y is up.
+        rig: The rig.
+        up: Turn (3, 3) of the world after which y is up.
 
     Raises:
-        InputError: the rig's legs have no length.
+        InputError: The rig's legs have no length.
     """
     average = average_skeleton()
     hips = rig.joints.hips
@@ -347,11 +347,11 @@ def _aim(
     """Turn a carrier (T, 3, 3) so that a bone reaches its end; return its length.
 
     Args:
-        carrier: turned in place.
-        direction: of the bone in the carrier (3,).
-        length: of the bone.
-        reach: from the bone's start to its wanted end (T, 3).
-        near: distance below which nothing is changed.
+        carrier: Turned in place.
+        direction: Of the bone in the carrier (3,).
+        length: Of the bone.
+        reach: From the bone's start to its wanted end (T, 3).
+        near: Distance below which nothing is changed.
     """
     distances = np.linalg.norm(reach, axis=1)
     pointing = carrier @ direction

@@ -64,10 +64,10 @@ def low(feet: Array, fps: float, seconds: float, height: float) -> NDArray[np.bo
     """Return whether feet (T, n, 3) are low (T, n).
 
     Args:
-        feet: the feet's places.
-        fps: frames per second.
-        seconds: time window, half of it before and half after each frame.
-        height: a foot is low if it is less than this above the lowest of all feet in
+        feet: The feet's places.
+        fps: Frames per second.
+        seconds: Time window, half of it before and half after each frame.
+        height: A foot is low if it is less than this above the lowest of all feet in
             the window, in metres.
     """
     reach = max(round(0.5 * seconds * fps), 1)
@@ -84,8 +84,8 @@ def slides(joints: Array, in_stance: NDArray[np.bool_]) -> Array:
     A slide is the greatest distance from where the foot first stood.
 
     Args:
-        joints: the joints.
-        in_stance: whether the left and the right foot are on the ground (T, 2), by
+        joints: The joints.
+        in_stance: Whether the left and the right foot are on the ground (T, 2), by
             `standing`, maybe of another motion.
     """
     slides = []

@@ -133,7 +133,6 @@ def chosen_kinds(write: str | Sequence[str] = ()) -> tuple[str, ...]:
 
     Raises:
         InputError: A kind is unknown.
-
     """
     parts = [write] if isinstance(write, str) else list(write)
     if not all(isinstance(part, str) for part in parts):
@@ -170,7 +169,6 @@ def write_files(
 
     Returns:
         A warning for each picture that could not be made.
-
     """
     for kind in kinds:
         if (write := WRITERS[kind].write) is not None:

@@ -128,7 +128,6 @@ class Painter:
             filmed: The footage, or None to draw on the masks.
             radii: The radii (levels, 27) of the joints' intervals, or None if the frame
                 has no posterior.
-
         """
         skeleton = self._scene.body.skeleton
         solid = None if radii is None else opacities(radii[MAIN_LEVEL])

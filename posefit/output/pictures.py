@@ -90,7 +90,6 @@ def write_pictures(paths: Mapping[str, Path], content: Content) -> list[str]:
 
     Returns:
         A warning for each of them that is missing.
-
     """
     if not paths:
         return []

@@ -78,7 +78,6 @@ def read_frames(path: Path) -> tuple[list[Frame], dict[str, Any] | None, str]:
     Returns:
         The frames; the state of the random generator after them, or None if there are
         no frames; and where the file is damaged, or "" if it is not.
-
     """
     frames = list[Frame]()
     whole_lines = list[bytes]()

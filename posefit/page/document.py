@@ -27,11 +27,11 @@ def assembled(
     """Yield the parts of a document with style, data and script in its markup.
 
     Args:
-        mark: the document's first line.
-        markup: the body, with a `PART` for the data and one for the script.
-        style: rules after the shared ones.
-        data: the value of `D` in the scripts.
-        script: the script, by `one_script`.
+        mark: The document's first line.
+        markup: The body, with a `PART` for the data and one for the script.
+        style: Rules after the shared ones.
+        data: The value of `D` in the scripts.
+        script: The script, by `one_script`.
     """
     head = part(__package__, "head.html")
     before, middle, after, end = f"{head}{markup}".split(PART)

@@ -55,7 +55,7 @@ def chart_figure(
         The figure.
 
     Raises:
-        ImportError: matplotlib is not installed.
+        ImportError: Matplotlib is not installed.
     """
     figure = empty_figure()
     axes = figure.add_subplot(xlabel=chart.x_label, ylabel=chart.y_label)
@@ -183,7 +183,7 @@ def write_figures(standings: Standings, path: str | Path) -> None:
     Raises:
         ValueError: The path exists and is not a folder of figures, or it cannot be
             written.
-        ImportError: matplotlib is not installed.
+        ImportError: Matplotlib is not installed.
     """
     contest = standings.contest
     names = [contest.runs.methods[m] for m in contest.methods]

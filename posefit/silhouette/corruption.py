@@ -35,14 +35,13 @@ def corrupted(
 
     Args:
         mask: (height, width).
-        noise: the strength, 0 to 1, of corruptions by name; see `CORRUPTIONS`.
-        rng: the source of random numbers.
-        visibly: whether a strength too small to change a pixel is doubled until it
+        noise: The strength, 0 to 1, of corruptions by name; see `CORRUPTIONS`.
+        rng: The source of random numbers.
+        visibly: Whether a strength too small to change a pixel is doubled until it
             does.
 
     Returns:
         The corrupted mask, or `mask` itself if nothing of it would be left.
-
     """
     damaged = mask
     for name, corrupt in CORRUPTIONS.items():
@@ -136,14 +135,13 @@ def wandering(
 
     Args:
         mask: (height, width).
-        rim: how far the border moves outwards, in pixels.
-        deviation: the standard deviation of the border around that, in pixels.
-        length: the length scale of the roughness, in pixels.
-        rng: the source of random numbers.
+        rim: How far the border moves outwards, in pixels.
+        deviation: The standard deviation of the border around that, in pixels.
+        length: The length scale of the roughness, in pixels.
+        rng: The source of random numbers.
 
     Returns:
         The mask (height, width).
-
     """
     inside = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 3)
     outside = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 3)

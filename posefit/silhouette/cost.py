@@ -63,18 +63,18 @@ def areas(
     device.
 
     Args:
-        body: the body.
-        camera: the camera.
-        silhouette: the silhouette in the camera's image.
+        body: The body.
+        camera: The camera.
+        silhouette: The silhouette in the camera's image.
         poses: (n, 66).
         translations: (n, 3) metres, the positions of the root.
-        threads: the number of threads; does not change the result.
+        threads: The number of threads; does not change the result.
 
     Returns:
         R, B, Y (n, 3) in pixels.
 
     Raises:
-        InputError: if shapes do not match, or if a number is not finite.
+        InputError: If shapes do not match, or if a number is not finite.
 
     Example:
         >>> from posefit import Body, Camera, Silhouette, areas, load_motion, project
@@ -160,19 +160,19 @@ def pose_costs(
     silhouette's device.
 
     Args:
-        body: the body.
-        cameras: the camera of each view.
-        silhouettes: the silhouette of each view.
+        body: The body.
+        cameras: The camera of each view.
+        silhouettes: The silhouette of each view.
         poses: (n, 66).
         translations: (n, 3) metres, the positions of the root.
-        beta: the weight of missed silhouette; spilled body has the weight 1 - `beta`.
-        threads: the number of threads; does not change the result.
+        beta: The weight of missed silhouette; spilled body has the weight 1 - `beta`.
+        threads: The number of threads; does not change the result.
 
     Returns:
         The costs (n,), 0 to 100, and the areas R, B, Y (views, n, 3) in pixels.
 
     Raises:
-        InputError: if the pixels of a camera are not square, if shapes do not match, or
+        InputError: If the pixels of a camera are not square, if shapes do not match, or
             if a number is not finite.
 
     Example:
@@ -269,13 +269,13 @@ def mismatch(areas: Areas, beta: float = BETA) -> Array:
 
     Args:
         areas: R, B, Y (n, 3) in pixels.
-        beta: the weight of missed silhouette; spilled body has the weight 1 - `beta`.
+        beta: The weight of missed silhouette; spilled body has the weight 1 - `beta`.
 
     Returns:
         The costs (n,).
 
     Raises:
-        InputError: if the areas are not numbers of this shape.
+        InputError: If the areas are not numbers of this shape.
 
     Example:
         >>> from posefit import mismatch
@@ -297,8 +297,8 @@ def project(body: Body, camera: Camera, pose: Array, translation: Array) -> Mask
     """Return the mask of one body.
 
     Args:
-        body: the body.
-        camera: the camera.
+        body: The body.
+        camera: The camera.
         pose: (66,).
         translation: (3,) metres, the position of the root.
 
@@ -306,7 +306,7 @@ def project(body: Body, camera: Camera, pose: Array, translation: Array) -> Mask
         The mask (height, width) in the camera's image.
 
     Raises:
-        InputError: if shapes do not match, or if a number is not finite.
+        InputError: If shapes do not match, or if a number is not finite.
 
     Example:
         >>> from posefit import Body, Camera, load_motion, project

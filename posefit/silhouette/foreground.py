@@ -99,7 +99,6 @@ class Segmenter(Protocol):
 
         Returns:
             Two masks (height, width): the person, and pixels that may be their shadow.
-
         """
         ...
 
@@ -249,7 +248,6 @@ def people(
     Returns:
         At least one person, who is empty if nobody is found. The others are at least a
         quarter as large as the first.
-
     """
     height = foreground.shape[0]
     inside = np.ones(foreground.shape, dtype=bool)

@@ -131,7 +131,6 @@ class Silhouette:
 
         Raises:
             InputError: The mask is not (height, width), or the shapes differ.
-
         """
         values = np.asarray(mask)
         if values.ndim != 2 or 0 in values.shape:
@@ -222,16 +221,15 @@ class Device(Protocol):
         """Return the areas of poses.
 
         Args:
-            body: the body.
-            camera: the camera.
-            silhouette: the silhouette in the camera's image.
+            body: The body.
+            camera: The camera.
+            silhouette: The silhouette in the camera's image.
             poses: (n, 66); the caller has checked the shape.
             translations: (n, 3) metres; the caller has checked the shape.
 
         Returns:
             R, B, Y (n, 3) in pixels, equal to the result of
             `posefit.silhouette.cost.areas` on a CPU.
-
         """
 
 

@@ -45,7 +45,6 @@ def people_in(mask: Mask, known: Mask | None = None) -> list[Pieces]:
 
     Returns:
         The people; an empty list for an empty mask.
-
     """
     box = padded_box(mask, 0)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(

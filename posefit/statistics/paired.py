@@ -160,9 +160,9 @@ def fewest_blocks(comparisons: int) -> int:
 
     The lowest p of n blocks, 2 / 2^n, must be below Bonferroni's level.
 
-    >>> fewest_blocks(1)
-    6
-
+    Example:
+        >>> fewest_blocks(1)
+        6
     """
     return math.ceil(1.0 - math.log2(SIGNIFICANCE / comparisons))
 

@@ -17,9 +17,10 @@ STANDARD_INSTANCES = 15  # the first held-out instances, as in plans
 def suite_registry() -> dict[str, Any]:
     """Return the registry of the numbered benchmark, as values for JSON.
 
-    >>> problem = suite_registry()["suites"]["posefit-2026.3"]["problems"][0]
-    >>> problem["name"], problem["bounds"]
-    ('single image', {'lower': -1.0, 'upper': 1.0})
+    Example:
+        >>> problem = suite_registry()["suites"]["posefit-2026.3"]["problems"][0]
+        >>> problem["name"], problem["bounds"]
+        ('single image', {'lower': -1.0, 'upper': 1.0})
     """
     first = HELD_OUT[0]
     suite = {

@@ -43,9 +43,9 @@ def check_optimiser(
     """Return the report on an optimiser's factory.
 
     Args:
-        factory: takes (space, rng) and keyword-only settings.
-        next_frame: the registered treatment of the optimiser at a new frame.
-        settings: passed to the factory.
+        factory: Takes (space, rng) and keyword-only settings.
+        next_frame: The registered treatment of the optimiser at a new frame.
+        settings: Passed to the factory.
 
     Returns:
         The report. It is true if no check failed.
@@ -63,8 +63,8 @@ def check_prior(factory: Factory, *, settings: Settings = None) -> Report:
     """Return the report on a prior's factory.
 
     Args:
-        factory: takes keyword-only settings.
-        settings: passed to the factory.
+        factory: Takes keyword-only settings.
+        settings: Passed to the factory.
 
     Returns:
         The report. It is true if no check failed.
@@ -84,9 +84,9 @@ def check_tracker(
     """Return the report on a tracker's factory.
 
     Args:
-        factory: takes (task) and keyword-only settings.
-        looks_ahead: whether the tracker is registered to read later frames first.
-        settings: passed to the factory.
+        factory: Takes (task) and keyword-only settings.
+        looks_ahead: Whether the tracker is registered to read later frames first.
+        settings: Passed to the factory.
 
     Returns:
         The report. It is true if no check failed.
@@ -109,8 +109,8 @@ def check_start(factory: Factory, *, settings: Settings = None) -> Report:
     """Return the report on a start's factory.
 
     Args:
-        factory: takes (task) and keyword-only settings.
-        settings: passed to the factory.
+        factory: Takes (task) and keyword-only settings.
+        settings: Passed to the factory.
 
     Returns:
         The report. It is true if no check failed.
@@ -133,8 +133,8 @@ def check_segmenter(factory: Factory, *, settings: Settings = None) -> Report:
     """Return the report on a segmenter's factory.
 
     Args:
-        factory: takes (film) and keyword-only settings.
-        settings: passed to the factory.
+        factory: Takes (film) and keyword-only settings.
+        settings: Passed to the factory.
 
     Returns:
         The report. It is true if no check failed.

@@ -155,9 +155,9 @@ def check_speed(what: str, limit: float, work: Callable[[int], int]) -> str:
     """Check the time that `work` takes for each item it makes.
 
     Args:
-        what: the item, as the messages name it.
-        limit: seconds that an item may take, in the fastest of three turns.
-        work: takes the number of the turn; returns how many items it made.
+        what: The item, as the messages name it.
+        limit: Seconds that an item may take, in the fastest of three turns.
+        work: Takes the number of the turn; returns how many items it made.
 
     Returns:
         The time for an item, as text.

@@ -34,13 +34,13 @@ def check_in_process(
     """Return the report on an installed plugin.
 
     Args:
-        kind: kind of plugin, such as "optimiser".
-        name: its registered name.
-        settings: texts such as `population_size=20`.
-        only: names of the checks to run, all by default.
+        kind: Kind of plugin, such as "optimiser".
+        name: Its registered name.
+        settings: Texts such as `population_size=20`.
+        only: Names of the checks to run, all by default.
 
     Raises:
-        ValueError: a setting or a check is wrong, or the plugin cannot be loaded.
+        ValueError: A setting or a check is wrong, or the plugin cannot be loaded.
     """
     task: dict[str, Any] = {
         "kind": kind,

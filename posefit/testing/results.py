@@ -50,7 +50,7 @@ class Check:
         """Return the result of the check.
 
         Args:
-            seconds: time limit, `SECONDS` by default.
+            seconds: Time limit, `SECONDS` by default.
 
         Returns:
             The result. An exception of the plugin becomes a failure.
@@ -119,8 +119,8 @@ def run_checks(plugin: str | Callable[..., Any], checks: Iterable[Check]) -> Rep
     Once two checks failed with the same cause, the others are skipped.
 
     Args:
-        plugin: its label, or its factory, which gives its name.
-        checks: the checks, in the order in which they run.
+        plugin: Its label, or its factory, which gives its name.
+        checks: The checks, in the order in which they run.
     """
     results: list[Result] = []
     for check in checks:

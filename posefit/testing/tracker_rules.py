@@ -51,12 +51,12 @@ class Tracked(NamedTuple):
     """The frames of a tracker, and how it computed them.
 
     Attributes:
-        tracker: the tracker, after its first track.
-        frames: one per observation.
-        taken: how many observations it had taken when it gave each frame.
-        warnings: of the audit.
-        inputs_unchanged: whether masks and anchor are as before.
-        random_unchanged: whether the global random generators are as before.
+        tracker: The tracker, after its first track.
+        frames: One per observation.
+        taken: How many observations it had taken when it gave each frame.
+        warnings: Of the audit.
+        inputs_unchanged: Whether masks and anchor are as before.
+        random_unchanged: Whether the global random generators are as before.
     """
 
     tracker: Tracker

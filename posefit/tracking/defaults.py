@@ -39,7 +39,6 @@ def completed(options: TrackOptions, motion: Source | None) -> TrackOptions:
 
     Raises:
         InputError: Options exclude each other.
-
     """
     footage = motion is None
     name = motion if isinstance(motion, str) and motion in built_in.names() else None
@@ -74,7 +73,6 @@ def _method(options: TrackOptions, footage: bool, built_in_name: str | None) -> 
         options: The options that the user chose.
         footage: Whether footage is tracked.
         built_in_name: The name of the built-in motion that is tracked, or None.
-
     """
     method = options.method
     offers = registry().offers

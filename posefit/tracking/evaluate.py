@@ -46,7 +46,6 @@ def evaluate(
 
     Returns:
         The track.
-
     """
     skeleton = scene.body.skeleton
     height_known = options.height is not None

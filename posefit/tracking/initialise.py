@@ -80,7 +80,6 @@ def initialise(
         task: The task, from `task_of`.
         options: The options of the track.
         progress: Gets messages.
-
     """
     if task.yaw is None:
         task = replace(task, start=method.start)
@@ -175,7 +174,6 @@ def fitted_build(
 
     Returns:
         The build, and the cameras.
-
     """
     task, chosen = _build_frames(
         task, scene.observations, follow, frames, seed, restarts

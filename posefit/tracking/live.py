@@ -197,7 +197,6 @@ def write_live(
 
     Raises:
         InputError: If the folder exists, or the stream breaks off.
-
     """
     folder = None if out is None else Path(out)
     latencies = list[float]()

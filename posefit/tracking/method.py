@@ -68,7 +68,6 @@ def method_names(method: str, default_prior: str = DEFAULT_PRIOR) -> MethodNames
 
     Raises:
         InputError: The name is unknown; the message lists the known ones.
-
     """
     optimiser, at, prior = method.partition("@")
     if at:
@@ -101,7 +100,6 @@ def offers_of(method: Any) -> tuple[Offer, str | Prior | None]:
     Raises:
         InputError: A name is unknown.
         ImportError: A library is not installed.
-
     """
     if isinstance(method, tuple):
         return _offered("optimiser", method[0]), method[1]
@@ -129,7 +127,6 @@ class Method:
         follow: Yields a frame for each observation of a task. It is
             `posefit.fitting.driving.drive` for this method's tracker and audit.
         start: Guesses first poses, or None for searches without a start.
-
     """
 
     name: str
@@ -162,7 +159,6 @@ def prepare(options: TrackOptions, task: Task) -> Method:
         InputError: A name, a setting or the budget is wrong.
         ImportError: A library is not installed.
         BrokenRuleError: A plugin breaks the rules of its kind.
-
     """
     optimiser, prior_choice = offers_of(options.method)
     if prior_choice is None:
@@ -274,7 +270,6 @@ def parsed_settings(
     Raises:
         InputError: A string has another form, a plugin or a setting is unknown, or a
             value is not valid.
-
     """
     places = places_of(offers)
     by_plugin: dict[str, dict[str, Any]] = {name: {} for name in places}

@@ -124,7 +124,6 @@ def track_scene(
 
     Returns:
         The track, with errors against the truth or signs of trust.
-
     """
     given = with_notes(on_device(scene, options.device), training)
     for warning in given.warnings:
@@ -243,7 +242,6 @@ def _of_one_picture(
         method: The method that tracked it.
         polishing: Evaluations for another search around the poses found; 0 for none.
         progress: Gets a warning if the prior cannot represent the pose.
-
     """
     prior = method.prior
     if prior is None:
@@ -308,7 +306,6 @@ def track_hypotheses(
         options: The options of the track.
         recorder: Has the frames of an interrupted track, and gets the others.
         progress: Gets messages and warnings.
-
     """
     recorded, state = recorder.earlier()
     gap = method.relocalise_gap if scene.truth is None else 0
@@ -366,7 +363,6 @@ def track_hypothesis(
         ahead: The observations from the pivot on.
         gap: After this many frames without the person, all yaws are searched again.
         behind: The frames from the pivot back in time. They are yielded first.
-
     """
     task = after(hypothesis.task, behind[0]) if behind else hypothesis.task
     task = replace(task, resumable=True)
@@ -539,7 +535,6 @@ def _resumed(
         hypothesis: The hypothesis before its first frame.
         recorded: The recorded frames.
         state: The state of the random generator after them.
-
     """
     hypothesis.rng.bit_generator.state = state
     frames = list[Frame]()

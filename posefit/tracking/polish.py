@@ -84,7 +84,6 @@ def polished(
 
     Returns:
         The frame, with the evaluations of the search and of polishing.
-
     """
     scene = task.body, task.cameras, observation.silhouettes
 
@@ -162,7 +161,6 @@ def _likely_poses(
     Returns:
         Poses (n, 66) and places (n, 3). Each pose is followed by its reflections; poses
         with exchanged legs or arms come last.
-
     """
     skeleton = task.body.skeleton
     poses = frame.pose[None]

@@ -166,7 +166,6 @@ def best_restart(
     Returns:
         The task with the best restart as the frame before the first, and all frames of
         the trial.
-
     """
     chosen = usable_observations(observations, TRIAL_FRAMES, TRIAL_STRIDE)
     if not chosen:
@@ -279,7 +278,6 @@ def relocalised(
         observations: The frames, in order.
         rng: The random numbers.
         gap: The length of a gap: frames without the person. 0: never search again.
-
     """
     if not gap:
         yield from follow(task, observations, rng)
@@ -404,7 +402,6 @@ def initial_guess(
         yaw: The known yaw in radians, or None. Poses that face elsewhere are left out.
         pose_known: Whether the first pose is known. Then only the seeds differ.
         first: The frame, as the first hypothesis estimated it.
-
     """
     camera_yaw = facing(task.cameras[0], first.translation)
     skeleton = task.body.skeleton
@@ -465,7 +462,6 @@ def retrack_spins(
     Returns:
         The track. Its `stay` has the first and the last frame that were kept, or None
         if all were.
-
     """
     frames = tracked.frames
     usable = np.array([observation.usable for observation in observations])
@@ -524,7 +520,6 @@ def tracked_again(
         follow: The tracker.
         number: Number of the pass, from 1.
         seed: The seed of the random numbers.
-
     """
     order = range(len(frames))[:: -1 if number % 2 else 1]
     start = replace(after(task, frames[order[0]]), before=())
@@ -553,7 +548,6 @@ def joined(skeleton: Skeleton, behind: Sequence[Frame], ahead: Frame) -> list[Fr
         skeleton: The person's skeleton.
         behind: The frames of the track from the meeting frame backwards.
         ahead: The meeting frame, as the other track has it.
-
     """
     here = ahead.posterior
     there = behind[0].posterior
@@ -585,7 +579,6 @@ def spin_mask(yaws: Array, usable: NDArray[np.bool_], fps: float) -> NDArray[np.
         yaws: (T,) radians.
         usable: (T,) whether a frame shows enough of the person.
         fps: Frames a second.
-
     """
     spins = np.zeros(len(yaws), dtype=bool)
     reach = max(round(SPIN_SECONDS * fps), 1)
@@ -612,7 +605,6 @@ def facing_consensus(
         cameras: The cameras.
         usable: (T,) whether a frame shows enough of the person.
         fps: Frames a second.
-
     """
     yaws = np.array([frame.pose[0] for frame in frames])
     steady = ~spin_mask(yaws, usable, fps)

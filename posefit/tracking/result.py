@@ -143,7 +143,6 @@ class Track:
 
         Raises:
             InputError: The name is unknown; the message lists all names.
-
         """
         angles = self._angles()
         if name not in angles:
@@ -210,7 +209,6 @@ class Track:
 
         Raises:
             InputError: The folder may not be written.
-
         """
         with OutputFolder(folder, force, False, {}, interactive().log) as output:
             output.finish(self.content)
@@ -276,7 +274,6 @@ class Fit:
 
         Returns:
             The picture.
-
         """
         from PIL import Image
 

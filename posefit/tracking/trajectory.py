@@ -73,7 +73,6 @@ def cheapest_sequence(costs: Array, steps: Array) -> NDArray[np.int64]:
     Args:
         costs: (n, S) the costs of the states.
         steps: (n - 1, S, S) the costs of the steps between them.
-
     """
     totals = costs[0]
     parents = []
@@ -176,7 +175,6 @@ def trajectory_cost(
         skeleton: The person's skeleton.
         fps: Frames a second.
         speed: The typical speed, metres a second.
-
     """
     shown = np.asarray(usable, dtype=bool)
     joints = skeleton.joints(np.array([frame.pose for frame in frames]))

@@ -83,7 +83,6 @@ def bench_cost(
 
     Returns:
         The cost.
-
     """
     motion = built_in.motion("walk", frames=1, fps=30.0)
     body = Body.of(motion.skeleton)

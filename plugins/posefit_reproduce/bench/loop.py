@@ -48,7 +48,6 @@ def loop_figures(threads: int | None = None) -> dict[str, Any]:
 
     Returns:
         The figures by name.
-
     """
     many = threads or cores()
     alone = bench_cost()

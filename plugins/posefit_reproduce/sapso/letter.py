@@ -25,12 +25,12 @@ class LetterSAPSO(SAPSO):
     """Algorithm 1 to the letter. Positions and velocities are in the unit box.
 
     Settings:
-        population_size (N): size of the swarm, 1 or more. Section 5.2.
-        iterations (C): number of evaluated populations, 1 or more. Section 5.2,
+        population_size (N): Size of the swarm, 1 or more. Section 5.2.
+        iterations (C): Number of evaluated populations, 1 or more. Section 5.2,
             Interpretation S10.
-        stop_temperature (T0): the search ends when the temperature falls to it, 0 or
+        stop_temperature (T0): The search ends when the temperature falls to it, 0 or
             more; at 0 only the iterations end the search. Interpretation S5.
-        inertia (A): initial factor on the old velocity, above 0.1; it falls to 0.1.
+        inertia (A): Initial factor on the old velocity, above 0.1; it falls to 0.1.
             Section 3.1, Interpretation S5.
     """
 

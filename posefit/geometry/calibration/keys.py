@@ -78,7 +78,6 @@ def check_others(name: str, others: Mapping[str, Any], *, placed: bool = False) 
 
     Raises:
         InputError: A key may describe the lens, or the place.
-
     """
     _check_suspects(name, others, placed=placed)
     for key, value in others.items():

@@ -149,7 +149,6 @@ class Calibration:
         Returns:
             Columns and rows in the distorted pictures, each (height, width) of
             `straight`.
-
         """
         lens = self.distortion[: 4 if self.fisheye else None]
         straight = straight or self.camera(size, np.eye(3))
@@ -184,7 +183,6 @@ class Calibration:
 
         Returns:
             Points (..., 3).
-
         """
         matrix = self._scaled_matrix(size)
         straight = straight or self.camera(size, np.eye(3))
@@ -245,7 +243,6 @@ def stated(
     Raises:
         InputError: No camera can have these values. The message completes `expected a
             calibration ..., got ...`.
-
     """
     if size is not None:
         size = _whole(size)

@@ -70,7 +70,6 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
     Raises:
         InputError: The file is not a calibration, or has no camera of that name. The
             message names the file and the mistake.
-
     """
     path, chosen = file_and_name(path)
     if not path.is_file():

@@ -80,7 +80,6 @@ def growth(body: Body, height: float | None, motion: Motion) -> tuple[Array, Arr
 
     Returns:
         The derivatives of joints (T, 17, 27, 3) and of radii (17, 26, 2), metres.
-
     """
     bodies = [
         shaped(body, np.exp(FACTOR_DIFFERENCE * row), height)
@@ -129,7 +128,6 @@ class Borders:
             view: Its number.
             rows: (n,) the frames.
             places: (n, 3) places of the person's root, roughly.
-
         """
         first = self._start + int(rows[0])
         last = self._start + int(rows[-1])
@@ -189,7 +187,6 @@ def fit_contours(
 
     Returns:
         The scene with the fitted body and cameras, the motion, and the build.
-
     """
     if len(motion) < 3 or not visibility.usable.any():
         return scene, motion, shape

@@ -72,7 +72,6 @@ def with_cheapest_legs(
 
     Returns:
         The smoothed frames, and whether legs are exchanged in each of them (T,).
-
     """
     scene = smoothed.scene
     shape = smoothed.shape
@@ -116,7 +115,6 @@ def legs_exchanged(
         beta: The weight in the cost, see `posefit.silhouette.cost`.
         threads: Number of threads. Does not change the result.
         borders: The borders of the scene's masks, if other fits share them.
-
     """
     scene = smoothed.scene
     borders = borders or Borders(scene.observations)
@@ -178,7 +176,6 @@ def _cheapest_exchanges(
         edges: The frames from which legs may be exchanged.
         switches: The cost of deciding otherwise at each edge.
         added: (T,) what an exchange adds to the costs of frames.
-
     """
     starts = [0, *edges]
     stops = [*edges, len(exchanged)]
@@ -212,7 +209,6 @@ def in_doubt(
 
     Returns:
         The edges, and whether any stretch may be better.
-
     """
     typical = np.median(costs[usable])
     excess = np.where(usable & (costs > HIGH_COST * typical), costs - typical, 0.0)
@@ -263,7 +259,6 @@ def doubtful(
         there: The motion with exchanged legs.
         costs: (T,) the costs of smoothed frames.
         usable: (T,) whether a frame shows enough of the person; others are left out.
-
     """
     legs, exchanged = (
         root_centred(motion.skeleton.joints(motion.poses))[:, LEG_JOINTS]

@@ -39,7 +39,6 @@ class Squares:
             which: The numbers.
             precise: (m, m) or (T, m, m) their precision.
             gradients: (T, m) the product of the precision and their values.
-
         """
         self.hessians[0, :, which, which] += precise
         self.gradients[:, which] += gradients
@@ -51,7 +50,6 @@ class Squares:
             which: The numbers.
             series: (T, m) their values now.
             weight: The factor on the differences.
-
         """
         bends = weight**2 * np.diff(series, 2, axis=0)
         count = len(series)
@@ -83,7 +81,6 @@ class Squares:
             series: (T, m) the values now.
             derivatives: (T, m, n) of the values by the numbers of the same frame.
             weight: The factor on the changes.
-
         """
         steps = weight**2 * (series[frames + 1] - series[frames])
         here = derivatives[frames]
@@ -146,7 +143,6 @@ def standing_feet(joints: Array, fps: float, viewpoints: Array) -> NDArray[np.bo
         viewpoints: (T, 3) metres, the position of the single camera that shows a frame,
             NaN if several show it. A single camera shows speeds only across the line of
             sight.
-
     """
     feet = joints[:, BALLS]
     sights = (joints[:, 0] - viewpoints)[:, [0, 2]]
@@ -329,7 +325,6 @@ def add_root(
             line of sight of a single camera it is `DEPTH_DEVIATION` of the distance, if
             that is more.
         moved: (T, 3) metres, the root relative to its estimate.
-
     """
     root = slice(0, 3)
     across = np.where(visibility.usable, deviation, UNUSABLE_DEVIATION)

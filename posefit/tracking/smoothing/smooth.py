@@ -51,7 +51,6 @@ def smooth(
         shape: The person's build if it was fitted, or None if it is known.
         beta: The weight in the cost, see `posefit.silhouette.cost`.
         borders: The borders of the scene's masks, if other fits share them.
-
     """
     visibility = Visibility.of(scene)
     scene, motion, shape = smoothed_motion(
@@ -81,7 +80,6 @@ def drawn(
         motion: The motion of its body.
         rows: (n,) the frames.
         beta: The weight in the cost, see `posefit.silhouette.cost`.
-
     """
     areas = list[Areas]()
     costs = list[Array]()
@@ -117,7 +115,6 @@ def smoothed_motion(
         beta: The weight in the cost, see `posefit.silhouette.cost`.
         scales: The reach of each step of the fit, metres.
         borders: The borders of the scene's masks, if other fits share them.
-
     """
     visibility = Visibility.of(scene)
     return fit_contours(

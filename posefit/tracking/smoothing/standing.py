@@ -53,7 +53,6 @@ def with_straight_legs(
         smoothed: The same, smoothed.
         beta: The weight in the cost, see `posefit.silhouette.cost`.
         borders: The borders of the scene's masks.
-
     """
     free = tracked.scene.body.skeleton.free
     stands = standing_long(smoothed)
