@@ -546,7 +546,12 @@ class SynthesisTracker:
     def track(
         self, observations: Iterable[Observation], rng: np.random.Generator
     ) -> Iterator[Frame]:
-        """Yield a `Frame` for each observation; only a few are in memory at a time."""
+        """Yield a `Frame` for each observation; only a few are in memory at a time.
+
+        Raises:
+            InputError: The budget does not hold one population of the optimiser, or
+                guessing the first pose took all of it.
+        """
         task = self.task
         predictor = Predictor(self.task, self.prior, self.prediction, self.tilt)
         optimiser: Optimiser | None = None

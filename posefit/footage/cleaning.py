@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.footage.people import Choice, Chooser, People, planes_of
+from posefit.footage.choice import Choice
+from posefit.footage.people import Chooser, People, planes_of
 from posefit.footage.views import (
     MOST,
     View,

@@ -8,8 +8,7 @@ from typing import Any, cast
 
 from posefit.errors import InputError
 from posefit.fitting.validation import plugin_errors
-from posefit.footage.options import checked_person
-from posefit.footage.people import Choice
+from posefit.footage.choice import Choice, checked_person
 from posefit.footage.quality import PEOPLE_SEGMENTER
 from posefit.reading import quoted
 from posefit.registry import registry

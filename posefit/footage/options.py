@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from posefit.errors import InputError
-from posefit.fitting.check import finite_number, pair, whole
+from posefit.fitting.check import pair
+from posefit.footage.choice import Choice, checked_person
 from posefit.geometry.units import UNITS
 from posefit.limits import HEIGHTS, RATES
 from posefit.options import (
@@ -26,7 +27,6 @@ from posefit.reading import quoted
 
 if TYPE_CHECKING:
     from posefit.footage.extraction import Extraction
-    from posefit.footage.people import Choice
     from posefit.footage.views import Range
     from posefit.geometry.calibration import Calibration, Up
     from posefit.geometry.camera import Camera
@@ -57,14 +57,6 @@ def _range(name: str, value: Any) -> tuple[int | None, int | None]:
     first = None if start is None else int(start)
     last = None if stop is None else int(stop)
     return first, last
-
-
-def checked_person(name: str, value: Any) -> "Choice":
-    """Return the number or the place of a person. Raises InputError for others."""
-    if is_whole(value):
-        return whole(name, value, 1)
-    across, down = pair(name, value, "a number, or (across, down) in pixels")
-    return finite_number(name, across), finite_number(name, down)
 
 
 def _degrees(name: str, value: Any) -> tuple[float, ...]:
@@ -148,7 +140,7 @@ def text_label(text: str) -> int:
         ) from None
 
 
-def text_person(text: str) -> "Choice":
+def text_person(text: str) -> Choice:
     """Return the number of a person from a text N, or a position in pixels from X,Y.
 
     Raises InputError for another form.
@@ -262,7 +254,7 @@ class SourceOptions(Options):
         ", a share of the person's area",
         live=False,
     )
-    person: "Choice | None" = option(
+    person: Choice | None = option(
         None,
         "Person to track if there are several: the number in the warning (1 is visible "
         "the longest), or the position X,Y given there.",

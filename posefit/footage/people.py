@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import NoPersonError
+from posefit.footage.choice import Choice
 from posefit.footage.views import unpacked
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask, padded_box
@@ -54,8 +55,6 @@ class Detection(NamedTuple):
     hidden: Cut | None  # unknown pixels, where others are too; None for a person alone
 
 
-# a person by number, from 1 for the longest visible, or by a point at which they appear
-Choice = int | tuple[float, float]
 Persons = list[list["Tracklet"]]  # the parts of each person
 Chooser = Callable[[Persons], int]  # returns the number of one of several people
 

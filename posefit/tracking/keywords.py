@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from posefit.fitting.prior import Prior
     from posefit.fitting.space import Translation
     from posefit.fitting.tracker import TrackerFactory
+    from posefit.footage.choice import Choice
     from posefit.footage.extraction import Extraction
     from posefit.footage.options import OneCamera
-    from posefit.footage.people import Choice
     from posefit.footage.views import Range
     from posefit.geometry.calibration import Up
     from posefit.geometry.units import Unit

@@ -378,7 +378,7 @@ def test_a_plugin_of_any_kind_is_shown_with_the_meaning_of_each_setting() -> Non
     for name, words in (
         (
             "sapso",
-            "--set sapso.cooling: float = 0.95 (gamma) factor on the temperature",
+            "--set sapso.cooling: float = 0.95 (gamma) Factor on the temperature",
         ),
         ("full", "--set full.limits: asf | training = asf"),
         ("masks", "It has no settings."),
