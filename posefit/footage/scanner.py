@@ -8,9 +8,9 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.footage.camera_motion import CameraMotion
+from posefit.footage.choice import Choice
 from posefit.footage.extraction import Extraction
 from posefit.footage.people import (
-    Choice,
     Chooser,
     People,
     Tracklet,
