@@ -1,6 +1,6 @@
 """Priors: joint angles as a few coordinates, with an interface like scikit-learn's.
 
-The root is no part of a prior, but its pitch and roll, the tilt, depend on the pose.
+The root is not part of a prior, but its pitch and roll, the tilt, depend on the pose.
 """
 
 from collections.abc import Callable, Sequence
@@ -48,7 +48,7 @@ class Latents(Protocol):
 
 
 class Prior(Latents, Protocol):
-    """Learned latents. The root is no part of a prior: SAPSO section 2.
+    """Learned latents. The root is not part of a prior: SAPSO section 2.
 
     It is built as `factory(**settings)`, with keyword-only settings. `low`, `high` and
     all methods but `fit` may be used only after `fit`.

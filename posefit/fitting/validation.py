@@ -1,4 +1,4 @@
-"""Checks of the answers of plugins in a run.
+"""Checks of what plugins return during a run.
 
 A broken rule ends the run, with one line that names the plugin and the call.
 """
@@ -102,7 +102,7 @@ class Checked:
         return self._call("feasible", latents)
 
     def _call(self, what: str, *arguments: Any) -> Any:
-        # not `plugin_errors`, which takes as long as a few poses
+        # not `plugin_errors`, whose overhead is as long as rasterising a few poses
         try:
             answer = self._drawn.during(getattr(self.plugin, what), *arguments)
         except BrokenRuleError:
@@ -132,7 +132,7 @@ class Checked:
 
 def check_population(proposals: Any, space: Space, name: str) -> None:
     """Raise BrokenRuleError, beginning with `name`, unless proposals are in the box."""
-    # neither a matrix nor a masked array, which calculate otherwise
+    # not a matrix or a masked array: their operators mean something else
     plain = type(proposals) is np.ndarray
     rule = ""
     if not plain or proposals.shape[1:] != (space.dimensions,):
@@ -213,7 +213,8 @@ class FreeAxes:
 
     @cached_property
     def _reach(self) -> Array:
-        """The largest allowed angles (n,), slow to learn from a large library."""
+        """The largest allowed angles (n,); cached, because a large library takes
+        long."""
         reach = np.zeros(len(self._fixed))
         for angles in self._training:
             off = np.abs(angles[:, self._fixed]).max(axis=0, initial=0.0)
