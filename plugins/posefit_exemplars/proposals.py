@@ -113,7 +113,7 @@ def next_states(exemplars: Exemplars, steps: ClipSteps, count: int) -> Beam:
 
 
 def fresh_count(evaluations: float) -> int:
-    """Return how many hypotheses of a frame are fresh: two at least."""
+    """Return how many hypotheses of a frame are fresh, two or more."""
     return max(int(FRESH_SHARE * evaluations / fresh_evaluations()), 2)
 
 

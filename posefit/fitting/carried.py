@@ -1,8 +1,8 @@
 """The state of a filter as plain values, so that an interrupted track can continue.
 
 Numbers, strings, arrays, and lists and mappings of them are stored. The filter's space
-and its generator are only marked, because the tracker has them. A filter with any other
-attribute starts over when a track is resumed.
+and its generator are only marked as such, because the tracker has them. A filter with
+any other attribute starts over when a track is resumed.
 """
 
 from collections.abc import Callable, Mapping
@@ -43,7 +43,7 @@ def carried(
             "optimiser": _kept(vars(optimiser), space, rng),
             "space": _fields(space),
         }
-    except (UnknownError, TypeError):  # `vars` fails without attributes
+    except (UnknownError, TypeError):  # `vars` needs a `__dict__`
         return {}
 
 

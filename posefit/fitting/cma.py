@@ -211,7 +211,8 @@ class CMAES:
     More points are drawn than needed, so that enough of them are feasible. If there are
     too few, others are moved towards the best of the last generation until they are
     feasible. A point drawn outside the box is evaluated where it was moved to, but
-    learned where it was drawn, and ranked below all points inside.
+    learned where it was drawn, and ranked below all points inside: its cost counts only
+    towards the best proposal.
 
     Settings:
         population_size (lambda): 5 or more, or 0 for 4 + 3 ln d, at least 5. Hansen

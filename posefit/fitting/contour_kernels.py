@@ -350,8 +350,7 @@ def accumulate_borders(parents, centres, radii, contour, scale, hessians, gradie
     neighbours = np.empty(count, np.int64)
     points = empty_points(cones, contour.step)
     for b in range(count):
-        # if one disc covers the other, the bone has no sides: a neighbour draws its
-        # border
+        # a bone with one disc covered by the other has no sides, and gets no points
         cone = cone_of(cones, b)
         if cone.length > abs(cone.taper) + TINY:
             on_sides = write_side_points(cone, contour.step, points)

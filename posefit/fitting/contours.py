@@ -173,8 +173,7 @@ class MaskContours:
 
 
 def coarseness(camera: Camera, places: Array) -> tuple[Array, int]:
-    """Return the pixels per metre (T,) at places (T, 3), and the step between used
-    pixels.
+    """Return pixels per metre (T,) at places (T, 3), and the step between used pixels.
 
     A mask that is finer than needed is read at every second, third, ... pixel only.
     """

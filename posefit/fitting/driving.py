@@ -154,7 +154,8 @@ def drive(
             audit.note(
                 "evaluations",
                 yielded,
-                f"say how many poses it drew, {counted:,}, got {frame.evaluations:,}",
+                f"count all poses it rasterised, {counted:,},"
+                f" got {frame.evaluations:,}",
             )
             frame = with_evaluations(frame, counted)
         if frame.evaluations > task.evaluations:

@@ -129,8 +129,7 @@ def _covariance() -> Array:
 
 
 def _without_ratio(covariance: Array) -> Array:
-    """Return a covariance (17, 17) in which the ratio of thigh to shank hardly
-    varies."""
+    """Return the covariance (17, 17) with nearly one ratio of thigh to shank."""
     with_ratio = covariance @ _RATIO
     share = np.outer(with_ratio, with_ratio) / (_RATIO @ with_ratio)
     return np.asarray(covariance - (1.0 - RATIO_SHARE) * share)

@@ -112,7 +112,7 @@ class Checked:
             raise _broken_by(self.name, what, error) from error
         if self._drawn.poses:
             rule = (
-                f"leave evaluations to the search, got {self._drawn.poses:g} by itself"
+                f"leave evaluations to the search, got {self._drawn.poses:g} of its own"
             )
             raise BrokenRuleError(f"{self.name}: {what} must {rule}")
         return answer
@@ -213,8 +213,7 @@ class FreeAxes:
 
     @cached_property
     def _reach(self) -> Array:
-        """The largest allowed angles (n,); cached, because a large library takes
-        long."""
+        """The largest allowed angles (n,). Cached: a large library takes long."""
         reach = np.zeros(len(self._fixed))
         for angles in self._training:
             off = np.abs(angles[:, self._fixed]).max(axis=0, initial=0.0)

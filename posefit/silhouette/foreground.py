@@ -1,4 +1,4 @@
-"""From video frames to people's masks: background models, cleaning, no holes.
+"""From video frames to masks of people: background models, cleaning, hole filling.
 
 Frames and backgrounds are (height, width, 3) uint8. Frames are not kept, so a video may
 have any length.

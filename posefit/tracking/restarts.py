@@ -113,8 +113,8 @@ def usable_observations(
 def first_shown_whole(observations: Sequence[Observation]) -> int:
     """Return the first frame in which the most cameras show the whole person.
 
-    In such a picture its edge cuts nothing off. If no camera ever shows the whole
-    person, return the first usable frame.
+    It shows the whole person if the edge of its picture cuts nothing off. If no camera
+    ever does, return the first usable frame.
     """
     best = 0
     most = 0.0
@@ -270,7 +270,7 @@ def relocalised(
     turned unseen. It also happens if all costs of half a second are half as high again
     as is typical since the last relocalisation. The restarts and the track as it is are
     compared over about a second of the coming observations, and the cheapest one
-    continues. The frame gets the evaluations and the time of them all.
+    continues. The frame gets the evaluations and the time of all that were compared.
 
     Args:
         task: The task.

@@ -53,13 +53,13 @@ from posefit.tracking.smoothing.path import (
 
 # Step of a difference quotient by the logarithm of a factor.
 FACTOR_DIFFERENCE = 1e-4
-# Standard deviations. An angle from its estimate, and the acceleration of this
-# difference, radians a second squared.
+# Standard deviations of an angle from its estimate, and of the acceleration of this
+# difference, in radians and radians a second squared.
 ANGLE_DEVIATION = np.radians(8.0)
 ANGLE_ACCELERATION = np.radians(450.0)
-# The root from its estimate, across the line of sight, metres.
+# Standard deviation of the root from its estimate, across the line of sight, metres.
 CONTOUR_ROOT_DEVIATION = 0.03
-# The turn of a calibrated camera about each axis. Our choice.
+# Standard deviation of the turn of a calibrated camera about each axis. Our choice.
 CAMERA_DEVIATION = np.radians(0.03)
 # The largest change in a step: of the logarithm of a factor, or of a camera's turn.
 MAX_FACTOR_STEP = 0.2
@@ -354,7 +354,8 @@ def _frame_squares(
 ) -> Squares:
     """Return the squares of a step: the borders, and what is known without them.
 
-    Known are the root and the angles of each frame, and that standing feet do not move.
+    What is known: the root and the angles of each frame, roughly, and that standing
+    feet do not move.
     """
     fitted = part.fitted
     estimate = part.estimate
