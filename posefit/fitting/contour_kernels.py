@@ -853,6 +853,7 @@ def fit_poses(chain, radii, views, prior, reaches, max_turn, poses, places):
         for i in range(count):
             _add_views(chain.parents, radii, views, frames[i], owners[i], reach, bones)
             write_screws(chain, frames[i], sines[i], cosines[i], all_screws)
+            # the twists of numbers that are held remain 0, so that they add nothing
             for a in free:
                 screws[a] = all_screws[a]
             composite_hessian(

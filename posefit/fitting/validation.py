@@ -283,6 +283,7 @@ def check_prior(prior: Latents, training: Array, skeleton: Skeleton, name: str) 
     for poses in (back, prior.inverse_transform(drawn)):
         if rule := axes.broken(np.asarray(poses)):
             raise broken(f"inverse_transform must {rule}")
+    # otherwise a search would have nothing to draw
     if not (
         np.any(feasible)
         or np.any(prior.feasible(prior.transform(sample)))

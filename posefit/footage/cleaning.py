@@ -79,6 +79,8 @@ def cleaned(
         store(k, mask & silhouette.valid)
     parts, several = people.chosen(choice, lambda frame: f"frame {view.numbers[frame]}")
     known = view.known
+    # Only a look at all frames shows that there are several people. The masks of the
+    # one who is followed then replace the masks stored above.
     if several:
         warnings.append(f"{view.name}: {several}")
         before = full_planes(count, view.size) if known is None else known

@@ -117,6 +117,7 @@ class FrameQuality:
         )
         typical = float(np.median(self._areas)) if self._areas else float(person.area)
         jitter = abs(person.area / typical - 1.0) if typical else 0.0
+        # other masks would shift the area that the next ones are compared with
         if likely:
             self._areas.append(person.area)
         if whole:

@@ -184,6 +184,7 @@ def fitted_build(
         rng = np.random.default_rng(seed)
         return list(follow(replace(task, body=body), chosen, rng))
 
+    # before the build, which would otherwise make up for errors of the calibration
     if scene.cameras_turn:
         filmed = replace(
             scene, body=task.body, observations=chosen, count=len(chosen), fps=task.fps

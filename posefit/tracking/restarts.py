@@ -480,6 +480,7 @@ def retrack_spins(
     longest = max(steady_runs, key=lambda run: run[1] - run[0])
     stay = best_ends(frames, *longest, task.fps)
     first, last = stay
+    # without this limit the tracker would find the same spins again
     steady = replace(task, fastest_turn=MAX_TURN_RATE)
 
     def followed_from(number: int, steady: Task, rows: range) -> list[Frame]:
@@ -497,6 +498,7 @@ def retrack_spins(
     cheap = mean_cost(new, usable) < SPIN_TOLERANCE * mean_cost(frames, usable)
     better = cheap and spins(new) < before
     new = with_total_effort([frames, new], int(better))
+    # frames that were not tracked again have only their own effort
     new[first : last + 1] = frames[first : last + 1]
     return tracked._replace(frames=new, stay=stay if better else None)
 

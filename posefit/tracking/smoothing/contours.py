@@ -306,11 +306,15 @@ def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Par
         part.body, turned, poses, places, scale, _changes(part)
     )
     squares = _frame_squares(part, hessians, gradients, angles)
+    # The factors and turns are shared by all frames. So the frames are eliminated first,
+    # which leaves a small system for the shared numbers (the Schur complement).
     solved = squares.steps_for(
         np.concatenate([squares.gradients[..., None], mixed], axis=2)
     )
     steps = solved[..., 0]
     by_factor = solved[..., 1:]
+    # What is known about people weighs as much as `BUILD_FRAMES` frames, however many
+    # frames there are.
     held = max(np.count_nonzero(part.visibility.usable) / BUILD_FRAMES, 1.0)
     values = np.append(part.factors, part.turns)
     known = np.eye(count + part.turns.size) / CAMERA_DEVIATION**2
@@ -320,6 +324,7 @@ def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Par
     changes = np.clip(
         np.linalg.solve(hessian, gradient), -MAX_FACTOR_STEP, MAX_FACTOR_STEP
     )
+    # the factors stay within the range in which builds are searched
     reach = REACH * SPREAD[:count]
     changes[:count] = part.factors - np.clip(
         part.factors - changes[:count], -reach, reach
