@@ -182,6 +182,7 @@ def cheapest_steps(sources, rows, tiles, buffers, bounds):
         farthest = np.float32((bound - total_before) / bounds.scale)
         for group in sources.groups[row]:
             for t in range(tiles.starts[group], tiles.starts[group + 1]):
+                # a lane that is no nearer keeps this distance, and is left out below
                 distances[:] = farthest
                 if not lower_distances(
                     distances, sources.codes[row], tiles.codes[t], partial

@@ -302,6 +302,7 @@ class HypothesisPath:
             The estimates, each with up to `delay` later frames known.
         """
         sampled = None
+        # separate random numbers: the sampled paths must not change the hypotheses
         frames = self._frames(estimates, rng.spawn(1)[0])
         for window in markov.windows(frames, self._delay):
             states = [frame.states for frame in window]

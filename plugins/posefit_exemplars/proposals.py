@@ -205,6 +205,7 @@ class StateProposals:
         if nearest is not None:
             states = np.resize(nearest[0], tried)
             yaws = np.resize(nearest[1], tried)
+            # the yaws of the table are `SAME_TURN` apart
             yaws += SAME_TURN * rng.uniform(-0.5, 0.5, tried)
         else:
             middle = 0.0 if known is None else known

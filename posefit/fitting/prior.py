@@ -137,7 +137,7 @@ class Tilt:
         latents = np.asarray(prior.transform(angles))
         scales = 0.5 * (np.asarray(prior.high) - np.asarray(prior.low))
         scaled = latents / np.where(scales > 0.0, scales, 1.0)
-        # about their circular mean, so that angles near pi and -pi are averaged correctly
+        # about their circular mean, because angles near pi and -pi are neighbours
         middle = np.arctan2(np.sin(tilts).mean(axis=0), np.cos(tilts).mean(axis=0))
         around = wrapped(tilts - middle)
         centre = scaled.mean(axis=0)

@@ -499,11 +499,11 @@ class Predictor:
         first = space.dimensions - len(latents)
         root = space.centre[:first].copy()
         root[1:3] = 0.0  # upright, or tilted as the pose predicts
-        away = space.proposals(np.concatenate([root, latents]))
+        mean = space.proposals(np.concatenate([root, latents]))
         spread = np.full(space.dimensions, self._prediction.floor)
         if self._task.yaw is None:
             spread[0] = 1.0
-        return Start(away, spread, np.zeros(space.dimensions))
+        return Start(mean, spread, np.zeros(space.dimensions))
 
 
 @dataclass(frozen=True, eq=False)

@@ -95,7 +95,7 @@ def independent(rng: np.random.Generator) -> np.random.Generator:
     return np.random.default_rng(deepcopy(rng).integers(0, 2**63, 4))
 
 
-# Before the first frame.
+# Restarts before the first frame.
 
 
 def usable_observations(
@@ -254,7 +254,7 @@ def after(task: Task, frame: Frame) -> Task:
     return replace(first, before=(with_carried(frame, None),))
 
 
-# During a track.
+# Restarts during a track.
 
 
 def relocalised(
@@ -291,6 +291,7 @@ def relocalised(
         if observation.usable and (latest := watch.due()) is not None:
             window = coming.ahead(1 + (TRIAL_FRAMES - 1) * TRIAL_STRIDE)
             seeds = independent(rng).integers(0, 2**32, 2).tolist()
+            # the track may be wrong in every way: only its place is kept
             unconstrained = replace(
                 task,
                 yaw=None,
@@ -373,7 +374,7 @@ class _Watch:
         return self._latest if costly or self._missing >= self._gap else None
 
 
-# Several hypotheses.
+# Initial guesses of several hypotheses.
 
 # The initial guesses of the hypotheses after the first one, in turn. The ones that are
 # mistaken for the right pose most often come first.
@@ -431,10 +432,10 @@ def initial_guess(
     return name, replace(after(task, replace(first, pose=poses[name])), before=())
 
 
-# After the last frame. A silhouette hardly distinguishes a body that faces the camera
-# from its reflection, which faces away. A track that confuses the two for a while spins
-# when it changes over, and when it changes back. Each of its frames then votes for one
-# of the two.
+# Tracking again after the last frame. A silhouette hardly distinguishes a body that
+# faces the camera from its reflection, which faces away. A track that confuses the two
+# for a while spins when it changes over, and when it changes back. Each of its frames
+# then votes for one of the two.
 
 
 def retrack_spins(

@@ -306,8 +306,8 @@ def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Par
         part.body, turned, poses, places, scale, _changes(part)
     )
     squares = _frame_squares(part, hessians, gradients, angles)
-    # The factors and turns are shared by all frames. So the frames are eliminated first,
-    # which leaves a small system for the shared numbers (the Schur complement).
+    # All frames share the factors and turns. So the frames are eliminated first, which
+    # leaves a small system for the shared numbers (the Schur complement).
     solved = squares.steps_for(
         np.concatenate([squares.gradients[..., None], mixed], axis=2)
     )
