@@ -154,7 +154,7 @@ class Measures:
     )
     swapped_known_rate: float | None = _share(
         "swapped where known",
-        "share of swapped frames among those whose left and right it calls known",
+        "share of swapped frames among those whose left and right are called known",
     )
     lost_flagged_rate: float | None = _share(
         "flagged lost", "share of frames that the method calls lost"

@@ -45,8 +45,9 @@ def combined(
 ) -> Scene:
     """Return the scene of what cameras saw at the same times.
 
-    The person is first searched where the rays through the middles of the masks meet.
-    With a single camera, the distance follows from the person's size in the image.
+    The search for the person begins where the rays through the middles of the masks
+    meet. With a single camera, the distance follows from the person's size in the
+    image.
 
     Args:
         views: What each camera saw.
