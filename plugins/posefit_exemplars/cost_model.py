@@ -301,8 +301,8 @@ class HypothesisCosts:
         """
         squares = self._exemplars.nearest(poses, 1)[1][:, 0]
         silhouette_costs = frame_costs.full(poses, places)
-        # hypotheses of a second pass have limbs that no clip combines, so that each
-        # view counts as much as the clips do
+        # in a second pass several cameras show limbs that no clip combines, so the
+        # distance from the clips counts only as much as one view
         first_pass = frame_costs.observation.estimate is None
         views = 1 if first_pass else frame_costs.camera_count
         library_cost = ALONE_LIBRARY_COST if frame_costs.alone else LIBRARY_COST

@@ -11,8 +11,9 @@ from posefit_exemplars.markov import SampledPaths
 class Estimate:
     """The pose estimated in a frame.
 
-    `path` makes it, its hypotheses and `smoothing` replace pose and place, and
-    `calibration` turns it into the reported frame.
+    `path` makes it from states of clips, and replaces its pose and place by those of
+    fitted hypotheses; `smoothing` filters them over time, and `calibration` turns the
+    estimate into the reported frame.
     """
 
     pose: Array  # (66,)

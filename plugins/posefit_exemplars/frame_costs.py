@@ -111,7 +111,7 @@ class FrameCosts:
         )
 
     def side_odds(self, pose: Array, place: Array) -> Array | None:
-        """Return how likely a pose (66,) has left and right where the landmarks have.
+        """Return how likely a pose (66,) has its sides as the landmarks show them.
 
         Returns:
             The logarithms of the odds (2,) for legs and for arms, or None if the frame

@@ -170,7 +170,7 @@ def cheapest_steps(sources, rows, tiles, buffers, bounds):
     best, parents, reached = buffers
     distances = np.empty(LANES, np.float32)
     partial = np.empty(LANES, np.float32)
-    # as many bins as states in each, if the totals are evenly spread
+    # as many bins as there are states in a bin, if the totals are evenly spread
     bins = np.zeros(int(np.sqrt(bounds.wanted)) + 1, np.int64)
     width = (bounds.limit - bounds.least) / len(bins)
     bound = bounds.limit
@@ -182,6 +182,7 @@ def cheapest_steps(sources, rows, tiles, buffers, bounds):
         farthest = np.float32((bound - total_before) / bounds.scale)
         for group in sources.groups[row]:
             for t in range(tiles.starts[group], tiles.starts[group + 1]):
+                # a lane that is no nearer keeps this distance, and is left out below
                 distances[:] = farthest
                 if not lower_distances(
                     distances, sources.codes[row], tiles.codes[t], partial

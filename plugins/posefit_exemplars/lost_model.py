@@ -37,7 +37,7 @@ MEAN_SECONDS = {"lately": 0.2, "in general": 1.0}  # decay times of the means
 EVIDENCE: Mapping[str, Callable[[float], float]] = {
     # cost of the reported pose, if the person is visible
     "cost": math.log1p,
-    # how much more the cheapest pose costs that is reflected along a line of sight, on
+    # how much more the cheapest of the poses reflected along a line of sight costs, on
     # the same scale
     "reflected": float,
     "mirrored": float,  # how much more the mirror image costs, on the same scale

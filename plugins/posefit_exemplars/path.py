@@ -164,7 +164,7 @@ class ClipPath:
                 frame_costs, proposed, poses, full, used
             )
         else:
-            # nothing is seen: clips continue, and all states cost the same
+            # the frame shows nothing: clips continue, and all states cost the same
             beam = next_states(self.exemplars, steps, BEAM_STATES)
             beam = replace(beam, places=frame_costs.at_root(beam.places))
             costs = np.zeros(len(beam))
@@ -213,7 +213,7 @@ class ClipPath:
         return beam.rows(best), costs[best], evaluations
 
     def _counts(self, frame_costs: FrameCosts, is_first: bool) -> tuple[int, int]:
-        """Return how many states get a cost at full size, and how many in small."""
+        """Return how many states get costs at full size and in the small picture."""
         # for the reported pose, its mirror images, and a fraction of a small picture
         reserve = 3 + frame_costs.camera_count
         evaluations = self._evaluations
@@ -221,7 +221,7 @@ class ClipPath:
             # several cameras leave less open, but the beam must be filled
             enough = min(evaluations, BEAM_STATES)
             evaluations = max(evaluations / frame_costs.camera_count, enough)
-        # at most as many states at full size as in small
+        # at most as many states at full size as in the small picture
         full = int(
             min(
                 FULL_SHARE * evaluations,
@@ -302,6 +302,7 @@ class HypothesisPath:
             The estimates, each with up to `delay` later frames known.
         """
         sampled = None
+        # separate random numbers: the sampled paths must not change the hypotheses
         frames = self._frames(estimates, rng.spawn(1)[0])
         for window in markov.windows(frames, self._delay):
             states = [frame.states for frame in window]

@@ -113,7 +113,7 @@ def next_states(exemplars: Exemplars, steps: ClipSteps, count: int) -> Beam:
 
 
 def fresh_count(evaluations: float) -> int:
-    """Return how many hypotheses of a frame are fresh: two at least."""
+    """Return how many hypotheses of a frame are fresh, two or more."""
     return max(int(FRESH_SHARE * evaluations / fresh_evaluations()), 2)
 
 
@@ -205,6 +205,7 @@ class StateProposals:
         if nearest is not None:
             states = np.resize(nearest[0], tried)
             yaws = np.resize(nearest[1], tried)
+            # the yaws of the table are `SAME_TURN` apart
             yaws += SAME_TURN * rng.uniform(-0.5, 0.5, tried)
         else:
             middle = 0.0 if known is None else known

@@ -15,12 +15,17 @@ the steps of the patent:
 `tracker` has the settings, and runs these steps on each frame. `first_state` searches
 for a state to start from.
 
->>> import posefit
->>> track = posefit.track(
-...     "jacks", method="vsmm", frames=(0, 3), translation="aligned", view_degrees=0.0
-... )
->>> track.summary["iou"] > 0.5
-True
+Example:
+    >>> import posefit
+    >>> track = posefit.track(
+    ...     "jacks",
+    ...     method="vsmm",
+    ...     frames=(0, 3),
+    ...     translation="aligned",
+    ...     view_degrees=0.0,
+    ... )
+    >>> track.summary["iou"] > 0.5
+    True
 """
 
 from posefit import hookimpl

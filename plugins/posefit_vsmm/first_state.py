@@ -2,7 +2,8 @@
 
 The patent does not say where the filter starts. Here a search of the silhouettes' cost
 finds the first state: it tries typical poses of the models at several yaws, then
-samples around the best so far. Each is moved to where it fits the silhouettes.
+samples around the best so far. Each state is first moved to where it fits the
+silhouettes.
 """
 
 from dataclasses import dataclass

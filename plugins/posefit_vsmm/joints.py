@@ -37,10 +37,10 @@ GATE = (0.35, 1.2)
 NO_GATE = (1e3, 1e3)
 
 Indices = NDArray[np.intp]
-# from distances (n, m) to the rows and columns of the pairs
+# takes distances (n, m), and returns the rows and columns of the pairs
 Pairs = Callable[[Array], tuple[Indices, Indices]]
-# from distances (2, n) to two knees, and positions along the line (n,), to a crossing
-# for each knee
+# takes distances (2, n) of n crossings from two knees, and positions (n,) along the
+# line; returns a crossing for each knee
 Crossings = Callable[[Array, Array], Indices]
 
 

@@ -36,7 +36,8 @@ _LOWER = [AT["left knee"], AT["right knee"], AT["left foot"], AT["right foot"]]
 Structure = Literal["variable", "all"]
 MIN_LIMBS = 3  # most of the four thighs and shanks. Interpretation V15
 FIRST_CYCLES = 10  # the patent's cycles over all models before a group is chosen
-# the default's: ten cycles are too few for the filter to converge. Interpretation V19
+# the same for the default, for which ten cycles are too few: the filter has not
+# converged. Interpretation V19
 FIRST_SECONDS = 1.0
 MIN_RATIO = 0.9  # of the new group to the old one; below it the new one ends
 

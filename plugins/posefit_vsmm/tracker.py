@@ -1,4 +1,4 @@
-"""The tracker `vsmm`: its settings, and its work on each frame."""
+"""The tracker `vsmm`: its settings, and how it advances by a frame."""
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -316,11 +316,11 @@ class VSMM:
         variant: "default", or "patent" for the patent's letter. Interpretations V4 to
             V6, V8, V9, V11, V14 and V15.
         structure: "variable" runs one group of models, and two during a switch; "all"
-            runs all models always, a plain IMM.
-        process_noise (Q): Of the models, as a multiple of their residuals' covariance,
+            always runs all models, as a plain IMM does.
+        process_noise (Q): Noise of the models, as a multiple of their residuals'
+            covariance, above 0. Interpretation V7.
+        joint_noise (R): Noise of the detected joints, as a multiple of their variances,
             above 0. Interpretation V7.
-        joint_noise (R): Of the detected joints, as a multiple of their variances, above
-            0. Interpretation V7.
         recovery: Whether a lost pose is estimated again and a lost limb is searched for
             in a larger area; by default yes, in the patent no. Interpretation V14.
     """

@@ -77,7 +77,7 @@ _FRAME_MEASURES = (
         "80 % interval",
         "mm",
         0,
-        "its radius, the mean over joints; blank where not estimated",
+        "mean radius of the 80 % intervals of the joints; blank where not estimated",
     ),
     MEASURES["evaluations"],
     Measure(
@@ -178,7 +178,7 @@ def evaluated(
     cost = np.array([frame.cost for frame in frames])
     held = np.zeros(len(frames), dtype=bool)
     iou = np.empty(len(frames))  # the mean over the cameras that saw something
-    # iterate once, as observations of a known motion are rendered
+    # one pass, because observations of a known motion are rendered each time
     for k, observation in enumerate(scene.observations):
         known = [silhouette.known for silhouette in observation.silhouettes]
         by_view = metrics.iou(frames[k].areas)
@@ -260,7 +260,7 @@ def _errors(
     def error_of(poses: Array) -> float:
         return float(metrics.pose_error_degrees(truth, poses).mean())
 
-    # what somebody reaches who does not search: a method has to beat all three
+    # what can be reached without a search: a method has to beat all three
     nearest_poses = []
     for k, observation in enumerate(scene.observations):
         nearest_poses.append(nearest(scene, training, k, observation, beta))

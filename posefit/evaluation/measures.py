@@ -100,13 +100,13 @@ class Measures:
         "geodesic",
         "degrees",
         2,
-        "angle between true and estimated rotations of root and joints, the mean",
+        "mean angle between true and estimated rotations of the root and the joints",
     )
     free_error_degrees: float | None = _figure(
         "error of free angles",
         "degrees",
         2,
-        "the error over only the angles that the skeleton lets move",
+        "error over only the angles that the skeleton leaves free",
     )
     mpjpe_mm: float | None = _figure(
         "MPJPE",
@@ -118,7 +118,7 @@ class Measures:
         "PA-MPJPE",
         "mm",
         0,
-        "the same after the best rotation, scale and translation (Procrustes)",
+        "MPJPE after the best rotation, scale and translation (Procrustes)",
     )
     iou: float = _figure(
         "IoU",
@@ -154,7 +154,7 @@ class Measures:
     )
     swapped_known_rate: float | None = _share(
         "swapped where known",
-        "share of swapped frames among those whose left and right it calls known",
+        "share of swapped frames among those whose left and right are called known",
     )
     lost_flagged_rate: float | None = _share(
         "flagged lost", "share of frames that the method calls lost"
@@ -167,7 +167,10 @@ class Measures:
         "walk; more is jitter",
     )
     acceleration_ratio: float | None = _figure(
-        "acceleration ratio", "", 1, "the same, divided by the true joints'"
+        "acceleration ratio",
+        "",
+        1,
+        "acceleration of the joints over that of the true joints",
     )
     foot_slide_mm: float | None = _figure(
         "foot slide",
@@ -196,13 +199,16 @@ class Measures:
         "errors of trivial methods, given the true root and translation",
     )
     baselines_mm: Mapping[str, float] | None = _figure(
-        "baselines' MPJPE", "mm", 0, "MPJPE of trivial methods, given the same"
+        "baselines' MPJPE",
+        "mm",
+        0,
+        "MPJPE of trivial methods, given the true root and translation",
     )
     prior_floor_degrees: float | None = _figure(
         "truth projected into the prior",
         "degrees",
         2,
-        "error of the true poses' projection; a floor of linear priors",
+        "error of the projected true poses; a lower limit for linear priors",
     )
     seconds_per_frame: float = _figure(
         "time",
@@ -212,7 +218,11 @@ class Measures:
         1e3,
     )
     cpu_seconds_per_frame: float = _figure(
-        "CPU time", "ms a frame", 1, "the same in CPU time of all threads", 1e3
+        "CPU time",
+        "ms a frame",
+        1,
+        "CPU time of all threads from the first mask to the last pose, over the frames",
+        1e3,
     )
     evaluations: int = _figure(
         "evaluations", "", 0, "poses whose cost was computed, in all stages together"
@@ -225,7 +235,7 @@ class Measures:
         "over them",
     )
     evaluations_per_second: float = _figure(
-        "speed", "poses a second", 0, "evaluations over that time"
+        "speed", "poses a second", 0, "evaluations over the wall time of the track"
     )
 
 

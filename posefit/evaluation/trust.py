@@ -35,7 +35,7 @@ SMOOTH_SECONDS = 0.5
 MIN_SMOOTH_FRAMES = 5  # of such a fit
 SCATTER_QUANTILE = 0.9  # the share of frames that are nearer to that path
 TRAINING_SECONDS = 1.0 / 15.0  # between the compared poses of a training motion
-# A share of the person's longer side. What moves this near to the body is clothes or
+# Share of the person's longer side. Whatever moves this near to the body is clothes or
 # hair.
 CLOTHES = 0.05
 MIN_MOVED = 0.02  # a share of the body's area; fewer pixels that moved are noise
@@ -254,8 +254,8 @@ class Sign:
 
     Attributes:
         limits: The best value, and the distances from it at which a track is doubtful
-            and unusable. None for a sign that never speaks against a track.
-        against: The text if the sign speaks against a track.
+            and unusable. None for a sign that never counts against a track.
+        against: The text if the sign counts against a track.
         listed: The text in the list of all signs.
     """
 
@@ -281,7 +281,7 @@ class Trust:
     Attributes:
         sentence: The grade, and the worst sign.
         grade: "good", "doubtful" or "do not use".
-        against: What speaks against the track, the worst first.
+        against: What counts against the track, the worst first.
         frames: The number of frames that show enough of the person.
         height_m: The height of the fitted body.
         size_m: The height of the person as seen by several cameras.
@@ -373,7 +373,7 @@ for _field in fields(Trust):
 
 
 def signs_against(figures: Mapping[str, Any]) -> list[tuple[Grade, str]]:
-    """Return what speaks against a track.
+    """Return what counts against a track.
 
     Args:
         figures: The figures of a `Trust` by name, None if unknown.
@@ -421,13 +421,13 @@ def sentence(figures: Mapping[str, Any], signs: Sequence[tuple[Grade, str]]) -> 
     """
     beginning = f"Trust: {_BEGINNING[grade_of(signs)]}"
     if not signs:
-        return f"{beginning}No sign speaks against it: {_listed(figures)}."
+        return f"{beginning}No sign counts against it: {_listed(figures)}."
     others = ""
     more = len(signs) - 1
     if more == 1:
-        others = ", and 1 more sign speaks against it"
+        others = ", and 1 more sign counts against it"
     elif more:
-        others = f", and {more} more signs speak against it"
+        others = f", and {more} more signs count against it"
     return f"{beginning}{signs[0][1]}{others}."
 
 
@@ -526,7 +526,7 @@ def trust_of(
         "training_mm": _figure(
             {SEVERAL: several, TOO_FEW: few},
             lambda: _training_mm(scene, frames, usable, training),
-            "no motion was learned from",
+            "the method learned from no motion",
         ),
         "lost": _figure({}, lambda: flagged_share(table, "lost"), NOT_REPORTED),
         "unknown": _figure(

@@ -1,4 +1,4 @@
-"""The problem that optimisers minimise, and trackers that follow it over frames.
+"""The problem that optimisers minimise, and trackers that follow a person.
 
 | looking for | file |
 |---|---|
@@ -13,7 +13,7 @@
 | weights of costs, and their effective number of samples | weights.py |
 | errors against a truth. SAPSO (8)-(10) | metrics.py |
 | the likelihood of a detector's landmarks | landmarks.py |
-| checks of the answers of optimisers and priors | validation.py |
+| checks of what optimisers and priors return | validation.py |
 | the loop that drives a tracker, and the audit of its frames | driving.py |
 | the build of one person, fitted with the poses | shape.py |
 | costs of many bodies in many frames, in one call | bodies.py, body_kernels.py |

@@ -1,8 +1,9 @@
 """The costs of many bodies in frames with fixed poses, in one compiled call.
 
-A build is searched by trying bodies. One call per body and frame would fill one lane of
-the kernel and leave the others empty, and spend more time in Python than in the kernel.
-Each pair of a body and a frame has the same cost, bit for bit, as alone.
+The search for a build tries many bodies. One call per body and frame would fill one
+lane of the kernel and leave the others empty, and spend more time in Python than in the
+kernel. The cost of a body in a frame is the same, bit for bit, as if it were computed
+alone.
 """
 
 from collections.abc import Iterable, Sequence

@@ -91,7 +91,7 @@ def count_pairs(chain, bodies, view, observed, poses, places, pairs, areas):
     frames = poses.shape[0]
     strips, words = observed.person.shape[1:]
     work = work_arrays(strips, words)
-    # a lane moves a pose and a place of one row: each of them has its own here
+    # a lane takes its pose and its place from one row: both are copied to its own
     block = np.arange(LANES)
     lane_poses = np.empty((LANES, poses.shape[1]))
     lane_places = np.empty((LANES, 3))

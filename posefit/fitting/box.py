@@ -128,8 +128,8 @@ def displacement(space: Space, origin: Array, target: Array) -> Array:
 def converted(space: Space, proposals: Array, origin: Space) -> Array:
     """Return the proposals (n, d) in `space` for the poses of `proposals` in `origin`.
 
-    A `Filter` needs it in `advance`, where `origin` is the space of the frame before. A
-    space without a method `moved` is the same box in every frame.
+    A `Filter` calls this in `advance`, where `origin` is the space of the frame before.
+    A space without a method `moved` is the same box in every frame.
 
     Args:
         space: The space of the result.

@@ -1,8 +1,8 @@
-"""The state of a filter as plain values, with which an interrupted track continues.
+"""The state of a filter as plain values, so that an interrupted track can continue.
 
-Numbers, strings, arrays, and lists and mappings of them are kept. The tracker knows the
-filter's space and its generator. A filter with any other attribute starts over when a
-track is resumed.
+Numbers, strings, arrays, and lists and mappings of them are stored. The filter's space
+and its generator are only marked as such, because the tracker has them. A filter with
+any other attribute starts over when a track is resumed.
 """
 
 from collections.abc import Callable, Mapping
@@ -43,7 +43,7 @@ def carried(
             "optimiser": _kept(vars(optimiser), space, rng),
             "space": _fields(space),
         }
-    except (UnknownError, TypeError):  # one without attributes has no `vars`
+    except (UnknownError, TypeError):  # `vars` needs a `__dict__`
         return {}
 
 
@@ -95,7 +95,7 @@ def _fields(space: SearchSpace) -> dict[str, Any]:
 
 
 def _kept(value: Any, space: Any, rng: Any) -> Any:
-    """Return a value in a plain form. Raises UnknownError if that is impossible."""
+    """Return a value in plain form. Raises UnknownError if it has none."""
     if value is space:
         return {KIND: "space"}
     if value is rng:
@@ -121,7 +121,7 @@ def _kept(value: Any, space: Any, rng: Any) -> Any:
 
 
 def _made(kept: Any, space: Any = None, rng: Any = None) -> Any:
-    """Return the value from which `_kept` made this."""
+    """Return the value that `_kept` turned into this plain form."""
     if not isinstance(kept, Mapping):
         if isinstance(kept, np.ndarray):
             return kept.copy()

@@ -208,10 +208,11 @@ class CMAES:
     When it stagnates, it starts again from a fresh draw with twice the population
     (IPOP).
 
-    The number of draws should give enough feasible proposals. If there are too few,
-    others are moved towards the best of the last generation until they are feasible. A
-    draw outside the box is learned at the point where it was drawn, as worse than all
-    others; the cost of its moved proposal counts only for the best.
+    More points are drawn than needed, so that enough of them are feasible. If there are
+    too few, others are moved towards the best of the last generation until they are
+    feasible. A point drawn outside the box is evaluated where it was moved to, but
+    learned where it was drawn, and ranked below all points inside: its cost counts only
+    towards the best proposal.
 
     Settings:
         population_size (lambda): 5 or more, or 0 for 4 + 3 ln d, at least 5. Hansen
@@ -294,7 +295,8 @@ class CMAES:
         # HANSEN2016 (B.5)
         ranked = np.where(self.beyond > 0.0, known.max() + self.beyond, known)
         learned = self.learned
-        # the mean continues past the end of a circle, and so must the learned points
+        # the mean of a periodic coordinate is never wrapped: learned points must be
+        # near it
         if self.space.periodic.any():
             learned = mean + displacement(self.space, mean, learned)
         self.strategy.learn(learned, ranked)

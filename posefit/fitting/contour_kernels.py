@@ -35,7 +35,7 @@ from posefit.geometry.kernels import place_frames, sine_cosine
 from posefit.geometry.skeleton import ANGLES
 from posefit.silhouette.rasteriser import NEAR
 
-NUMBERS = 3 + ANGLES  # of a place and a pose
+NUMBERS = 3 + ANGLES  # numbers of a place and a pose
 # a point of the border has two independent errors, with these standard deviations
 BORDER_DEVIATION = 0.01  # metres
 PIXEL_DEVIATION = 0.5  # pixels
@@ -309,7 +309,7 @@ def _nearest_bone(x, y, first, cones, discs):
 
 @inlined
 def _write_neighbours(bone, discs, neighbours):
-    """Write which other bones have discs that meet the bone's. Return their number."""
+    """Write which bones have a disc that meets this bone's. Return their number."""
     count = 0
     for b in range(discs.shape[0]):
         reach = discs[b, 2] + discs[bone, 2]
@@ -322,7 +322,7 @@ def _write_neighbours(bone, discs, neighbours):
 
 @inlined
 def hide(points, count, cone):
-    """Mark those of the first `count` points as hidden that a cone covers."""
+    """Mark as hidden which of the first `count` points a cone covers."""
     # Out of the loop: an array that is taken from a tuple changes its reference count,
     # which keeps the loop from vector registers.
     columns = points.columns
@@ -350,7 +350,7 @@ def accumulate_borders(parents, centres, radii, contour, scale, hessians, gradie
     neighbours = np.empty(count, np.int64)
     points = empty_points(cones, contour.step)
     for b in range(count):
-        # otherwise one disc covers the other
+        # a bone with one disc covered by the other has no sides, and gets no points
         cone = cone_of(cones, b)
         if cone.length > abs(cone.taper) + TINY:
             on_sides = write_side_points(cone, contour.step, points)
@@ -384,13 +384,13 @@ def _accumulate_mask_border(contour, scale, cones, discs, products):
 
 @inlined
 def side_pieces(length, step):
-    """Return into how many pieces each side of a bone is cut: two at least."""
+    """Return the number of pieces that each side of a bone is cut into, two or more."""
     return max(int(length / (2.0 * step)) + 1, 2)
 
 
 @inlined
 def empty_points(cones, step):
-    """Return `Points` with room for those of the longest bone."""
+    """Return `Points` with room for the points of the longest bone."""
     longest = 0.0
     for b in range(cones.shape[0]):
         longest = max(longest, cone_of(cones, b).length)
@@ -604,7 +604,8 @@ def _accumulate_twists(rows, drawn, worth, work, hessian, force):
 def add_view(parents, radii, camera, frames, contour, reach, grown, sums):
     """Add the squares of one view to the `sums` of the bones.
 
-    `frames` (27, 4, 3) are of the joints. Distances beyond `reach` metres count less.
+    `frames` (27, 4, 3) are the joints' coordinate frames. Distances beyond `reach`
+    metres count less.
     """
     hessians, forces = sums
     count = parents.size
@@ -649,8 +650,8 @@ def _add_growth(b, parent, rows, per_metre, drawn, worth, grown, forces):
         per_metre: The pixels per metre at each joint.
         drawn: The Hessian and the gradient by the bone's numbers, from (5).
         worth: The weight of the view's residuals, from (6).
-        grown: The derivatives by the factors; its `squares` are added to.
-        forces: The spatial forces (6, 1 + F) of the bone, which are added to.
+        grown: The derivatives by the factors; its `squares` are incremented.
+        forces: The spatial forces (6, 1 + F) of the bone, which are incremented.
     """
     block, gradient = drawn
     factors = len(grown.joints)
@@ -806,7 +807,7 @@ def _numbers(chain, joint):
 def add_frames(parents, radii, camera, frames, contours, reach, grown, sums):
     """Add the squares of one view of T frames to the `sums` of the bones.
 
-    `frames` (T, 27, 4, 3) are of the joints. See `add_view`.
+    `frames` (T, 27, 4, 3) are the joints' coordinate frames. See `add_view`.
     """
     starts = contours.starts
     for i in range(len(frames)):
@@ -852,6 +853,7 @@ def fit_poses(chain, radii, views, prior, reaches, max_turn, poses, places):
         for i in range(count):
             _add_views(chain.parents, radii, views, frames[i], owners[i], reach, bones)
             write_screws(chain, frames[i], sines[i], cosines[i], all_screws)
+            # the twists of numbers that are held remain 0, so that they add nothing
             for a in free:
                 screws[a] = all_screws[a]
             composite_hessian(
@@ -868,7 +870,7 @@ def fit_poses(chain, radii, views, prior, reaches, max_turn, poses, places):
 def _add_views(parents, radii, views, frames, owners, reach, bones):
     """Overwrite the squares of the bones with the sums over one frame's views.
 
-    `owners` (n,) are of the points of all views. See `add_view`.
+    `owners` (n,) has the nearest bone of each point, view after view. See `add_view`.
     """
     bones.hessians[:] = 0.0
     bones.forces[:] = 0.0
@@ -938,10 +940,10 @@ def solve_symmetric(matrix, right):
     Only the lower half of the matrix (m, m) is read. The matrix is overwritten, and the
     right side (m,) becomes the solution.
 
-    The last number is eliminated first, so from the ends of the limbs inwards: an angle
-    shares second derivatives only with those between it and the root, and in this order
-    the other zeros remain zero (Featherstone, Rigid body dynamics algorithms, 2008,
-    section 6.5).
+    Numbers are eliminated from the last to the first, that is from the ends of the
+    limbs inwards. An angle shares second derivatives only with the numbers between it
+    and the root, and in this order all other zeros remain zero (Featherstone, Rigid
+    body dynamics algorithms, 2008, section 6.5).
     """
     m = right.size
     for k in range(m - 1, -1, -1):

@@ -27,7 +27,7 @@ from posefit.silhouette.mask import (
 )
 from posefit.silhouette.sharing import shares_of, work_through
 
-# pixels per metre; of a finer mask only every second, third or later pixel is used
+# pixels per metre; a finer mask is read at every second, third, ... pixel only
 FINE_PIXELS = 80.0
 FIELD_MARGIN = 48  # pixels: distances are known up to this margin around a mask
 # metres, step by step: larger distances count less, because that border may belong to
@@ -57,7 +57,7 @@ class MaskContours:
     A frame that shows too little has no points.
     """
 
-    # all pixels below are this camera's; for fine masks it is coarser than the masks'
+    # pixels below are this camera's; it has fewer of them than a fine mask has
     camera: Camera
     step: float  # pixels of the border that a point represents
     # (T, h, w) pixels outside the mask, negative within, and 0 if unknown
@@ -99,7 +99,8 @@ class MaskContours:
         corners = [corner for _, corner, _ in traced]
         sizes = np.array([distances.shape for _, _, distances in traced])
         fields = np.zeros((len(traced), *sizes.max(axis=0)), dtype=np.float32)
-        # each is dropped once it is copied: together they are as large as the fields
+        # each frame's distances are freed once copied: together they are as large as
+        # `fields`
         while traced:
             _, _, distances = traced.pop()
             rows, columns = distances.shape
@@ -172,7 +173,7 @@ class MaskContours:
 
 
 def coarseness(camera: Camera, places: Array) -> tuple[Array, int]:
-    """Return the pixels per metre (T,) at places (T, 3), and the spacing of those used.
+    """Return pixels per metre (T,) at places (T, 3), and the step between used pixels.
 
     A mask that is finer than needed is read at every second, third, ... pixel only.
     """
@@ -239,8 +240,8 @@ def _free_numbers(skeleton: Skeleton) -> Integers:
 class ContourSquares(NamedTuple):
     """Half the Hessians and gradients of the squared distances between borders.
 
-    They are by n numbers of each frame, the root's place and the free angles, and by F
-    factors that all frames share.
+    The derivatives are with respect to n numbers of each frame, the root's place and
+    the free angles, and to F factors that all frames share.
     """
 
     hessians: Array  # (T, n, n)

@@ -160,7 +160,8 @@ class SilhouetteCost:
     def __call__(self, proposals: Array) -> Array:
         """Return the cost (n,), 0 to 100, of proposals (n, d)."""
         if proposals.shape[1:] != (self.space.dimensions,):
-            # raises InputError with this shape, not that of one thread's part
+            # checked here, so that the message has this shape, not that of one thread's
+            # part
             self.space.decode(proposals)
         if self.on_device:
             return self.cost_and_areas(*self.decode(proposals))[0]
@@ -180,8 +181,8 @@ class SilhouetteCost:
     def coarser(self, factor: int) -> "SilhouetteCost":
         """Return the same cost on every `factor`th pixel of every `factor`th row.
 
-        It is made once. It has the same space, and a proposal decodes to the same pose.
-        See `posefit.silhouette.mask`.
+        The result is cached. It has the same space, and a proposal decodes to the same
+        pose. See `posefit.silhouette.mask`.
         """
         if factor not in self._coarser:
             cameras = []

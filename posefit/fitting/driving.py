@@ -33,7 +33,7 @@ class Audit:
     """The wrong figures in a tracker's frames; `warnings` has a line for each kind."""
 
     name: str  # the name of the tracker
-    beta: float  # the weight in the cost that it reports
+    beta: float  # the weight in the cost that the tracker reports
     # by kind: the message of the first finding, and the number of findings
     _findings: dict[str, tuple[str, int]] = field(default_factory=dict)
 
@@ -76,7 +76,7 @@ def drive(
 
     Args:
         make: Makes the tracker of a task.
-        audit: Gets the wrong figures.
+        audit: Collects the wrong figures.
         task: The task.
         observations: The frames, in order.
         rng: The random numbers.
@@ -87,7 +87,7 @@ def drive(
     Raises:
         BrokenRuleError: A frame is missing or breaks a rule.
     """
-    waiting = deque[Observation]()  # taken observations, without frames yet
+    waiting = deque[Observation]()  # taken observations that have no frame yet
     reading = np.zeros(2)  # time of reading observations, which is not the tracker's
     unreadable: Exception | None = None
 
@@ -98,7 +98,8 @@ def drive(
         while True:
             start = clocks()
             try:
-                # rendering a motion is not an evaluation
+                # an observation of a known motion is rendered here, which is not an
+                # evaluation
                 with uncounted():
                     observation = next(coming)
             except StopIteration:
@@ -153,7 +154,8 @@ def drive(
             audit.note(
                 "evaluations",
                 yielded,
-                f"say how many poses it drew, {counted:,}, got {frame.evaluations:,}",
+                f"count all poses it rasterised, {counted:,},"
+                f" got {frame.evaluations:,}",
             )
             frame = with_evaluations(frame, counted)
         if frame.evaluations > task.evaluations:

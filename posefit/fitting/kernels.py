@@ -75,8 +75,8 @@ def _find_outermost(focal, scale, radii, relative, root, discs, outermost):
         discs[2, j] = scale * radii[j] * depth
     left = top = right = bottom = -np.inf
     leftmost = topmost = rightmost = lowest = 0
-    # Values are chosen without branches: a processor guesses wrong which joint comes
-    # next, and that took longer than all the rest of the comparison.
+    # Values are chosen without branches: a processor cannot predict which joint is
+    # outermost, and its wrong guesses took longer than the rest of the comparison.
     for j in range(radii.size):
         across = discs[0, j]
         down = discs[1, j]
@@ -102,9 +102,9 @@ def move_to_borders(
     """Move translations (n, 3) to where joints (n, 27, 3) fill the borders (views, 4).
 
     The borders are left, top, right, bottom. Each known border is one linear equation,
-    r . t = gap. The least squares over all of them solve A t = b, where A, here xx to
-    zz, is the sum of r r', and b is the sum of gap r. The damping pulls t towards its
-    former value.
+    r . t = gap. The least-squares solution over all of them satisfies A t = b, where A
+    is the sum of r r' (xx to zz in the code), and b is the sum of gap r. The damping
+    pulls t towards its former value.
     """
     views = borders.shape[0]
     count = joints.shape[1]
@@ -181,7 +181,7 @@ def unpack_proposals(
     """Write root angles, translations and latents of proposals (n, d).
 
     Pitch and roll are added to the tilt expected for the latents, by `mean` (3 + m, 2)
-    of a `Tilt`. Without coordinates for it, the translation is the anchor.
+    of a `Tilt`. If proposals have no coordinates for the translation, it is the anchor.
 
     Returns:
         Whether all values are finite.

@@ -41,9 +41,9 @@ def landmark_likelihoods(
 ) -> Array:
     """Return the logarithms of the likelihoods (n, K, 2) of landmarks, given poses.
 
-    K are the groups of each view. The last axis is for the unchanged group, and for
-    the group with left and right exchanged. A joint counts by its confidence.
-    Distances have a Cauchy distribution.
+    K counts the groups of joints in all views. The last axis is for the unchanged
+    group, and for the group with left and right exchanged. A joint counts by its
+    confidence. Distances have a Cauchy distribution.
 
     Args:
         skeleton: The person's skeleton.

@@ -64,11 +64,11 @@ class Filter(Optimiser, Protocol):
 
 
 # Builds an optimiser for one search, as `factory(space, rng, **settings)`: a Space, a
-# NumPy Generator that is the only source of randomness, and keyword-only settings. For
-# a factory that takes them, the driver fills in two settings: `evaluations`, the budget
-# of one search, and `iterations`, the number of populations after the first for which
-# this budget is enough. A factory with a true attribute `baseline` searches at random,
-# as a baseline for the others: the checks do not require it to beat chance.
+# NumPy Generator that is the only source of randomness, and keyword-only settings. The
+# driver fills in two settings if the factory takes them: `evaluations`, the budget of
+# one search, and `iterations`, the number of populations after the first for which this
+# budget is enough. A factory with a true attribute `baseline` searches at random, as a
+# baseline for the others: the checks do not require it to beat chance.
 OptimiserFactory = Callable[..., Optimiser]
 
 # The optimiser of the next frame. "start": a new one around the prediction, SAPSO (6),

@@ -1,6 +1,6 @@
 """Priors: joint angles as a few coordinates, with an interface like scikit-learn's.
 
-The root is no part of a prior, but its pitch and roll, the tilt, depend on the pose.
+The root is not part of a prior, but its pitch and roll, the tilt, depend on the pose.
 """
 
 from collections.abc import Callable, Sequence
@@ -48,7 +48,7 @@ class Latents(Protocol):
 
 
 class Prior(Latents, Protocol):
-    """Learned latents. The root is no part of a prior: SAPSO section 2.
+    """Learned latents. The root is not part of a prior: SAPSO section 2.
 
     It is built as `factory(**settings)`, with keyword-only settings. `low`, `high` and
     all methods but `fit` may be used only after `fit`.
@@ -137,6 +137,7 @@ class Tilt:
         latents = np.asarray(prior.transform(angles))
         scales = 0.5 * (np.asarray(prior.high) - np.asarray(prior.low))
         scaled = latents / np.where(scales > 0.0, scales, 1.0)
+        # about their circular mean, because angles near pi and -pi are neighbours
         middle = np.arctan2(np.sin(tilts).mean(axis=0), np.cos(tilts).mean(axis=0))
         around = wrapped(tilts - middle)
         centre = scaled.mean(axis=0)
@@ -152,6 +153,7 @@ class Tilt:
         )
         low = low - margin
         high = high + margin
+        # people who turn over may have any tilt, also one that no training pose has
         whole = high - low > 2.0 * TURNS_OVER
         slopes /= np.where(scales > 0.0, scales, 1.0)[:, None]
         rows = middle + mean.min(axis=0), middle + mean.max(axis=0), base, slopes

@@ -57,7 +57,7 @@ def minimise(
     The search ends when the optimiser proposes nothing, or when its next population
     is larger than what is left of the budget; that population is not evaluated. If the
     optimiser stops before half of the budget is used, a warning is given, because its
-    schedule may not know the budget. `budget_known` says that it does.
+    schedule may not know the budget. With `budget_known` there is no warning.
 
     Args:
         problem: What to minimise; it must have a budget.
@@ -162,7 +162,7 @@ class Problem:
         repair: Callable[[Array], Array] | None = None,
         noisy: Callable[[Array, int], Array] | None = None,
         targets: Array | None = None,
-        id: str = "problem",  # noqa: A002, as COCO has it
+        id: str = "problem",  # noqa: A002, COCO's name
     ) -> None:
         if budget is not None:
             whole("budget", budget, 1)
@@ -372,8 +372,8 @@ class Problem:
 class Problems:
     """Several problems, one per row: counts and bests as arrays.
 
-    The owner evaluates their proposals together, in one compiled call, and then counts
-    them here.
+    The caller evaluates the proposals of all problems together, in one compiled call,
+    and then counts them here.
 
     Args:
         count: The number of problems.

@@ -1,8 +1,8 @@
 """A race of modes: short searches from several starts, then long ones from the best.
 
-The weights decide which starts get a short search, and the costs after it which of them
-get the rest of the budget. Each search is a problem; together they have the budget of
-one.
+The weights decide which starts get a short search. The costs that these reach decide
+which starts get the rest of the budget. Each search is a problem of its own; together
+they use the budget of one.
 """
 
 from collections.abc import Callable, Sequence

@@ -79,11 +79,11 @@ PROPORTIONS_CORRELATION = np.array(
         [0.23, 0.31, 0.56, -0.25, -0.31, 0.26, 0.33, 1.00],
     ]
 )
-# The share of its variance that the ratio of thigh to shank keeps in the fit, so small
-# that the fit does not change it. In a mask, the knee is where the flesh of the thigh
-# and that of the shank meet. Most flesh is behind the bones, by 2 cm (Dumas et al.
-# 2007): a knee that is a little bent seems to be higher than it is, by more than the
-# 6 % by which people's ratios vary, and in every frame and every view.
+# Factor on the variance of the ratio of thigh to shank in the fit, so small that the
+# fit does not change the ratio. In a mask, the knee is where the flesh of the thigh and
+# that of the shank meet. Most flesh is behind the bones, by 2 cm (Dumas et al. 2007): a
+# knee that is a little bent seems to be higher than it is, by more than the 6 % by
+# which people's ratios vary, and in every frame and every view.
 RATIO_SHARE = 1e-4
 SCALE_SPREAD = 0.10
 HIPS_SPREAD = 0.06
@@ -93,9 +93,9 @@ GIRTH_SPREAD = 0.30
 JOINT_SPREAD = 0.01
 REACH = 3.0  # the search reaches this many spreads to either side
 PULL = 0.15  # cost of a build that is one spread away from the average
-# Each round fits the poses with the body, and then the body with the poses. It has the
-# spread of CMA-ES's first draws, in spreads of people, and the number of generations.
-# The second round begins near the end of the first.
+# Each round fits the poses of a fixed body, and then the body in these poses. The
+# numbers are the spread of CMA-ES's first draws, in spreads of people, and how many
+# generations it makes. The second round begins near the result of the first.
 ROUNDS = ((0.5, 60), (0.2, 20))
 
 
@@ -129,7 +129,7 @@ def _covariance() -> Array:
 
 
 def _without_ratio(covariance: Array) -> Array:
-    """Return the covariance (17, 17) of people whose legs have nearly one ratio."""
+    """Return the covariance (17, 17) with nearly one ratio of thigh to shank."""
     with_ratio = covariance @ _RATIO
     share = np.outer(with_ratio, with_ratio) / (_RATIO @ with_ratio)
     return np.asarray(covariance - (1.0 - RATIO_SHARE) * share)

@@ -153,8 +153,8 @@ class SearchSpace:
     def decode(self, proposals: Array) -> tuple[Array, Array]:
         """Return the poses (n, 66) and translations (n, 3) of proposals (n, d).
 
-        An aligned translation is only its anchor here. The problem, which has the
-        silhouettes, aligns it.
+        An aligned translation is only its anchor here. `SilhouetteCost`,
+        which has the silhouettes, aligns it.
 
         Raises:
             InputError: The shape is wrong, or a proposal is not finite.

@@ -38,7 +38,7 @@ from posefit.uncertainty.modes import Mode, Posterior
 # step.
 SPREAD = 1.0
 # Interpretation S5: the floor of these deviations, in half-ranges of the box, so that a
-# still subject keeps some spread.
+# person who stands still keeps some spread.
 FLOOR = 0.05
 HISTORY_FRAMES = 3  # frames that a prediction looks back
 TILT_SHARE = 0.99  # ours: the search covers the tilts of this share of training poses
@@ -311,8 +311,9 @@ class Prediction:
     Settings:
         spread (k): Standard deviations of the start, as multiples of the predicted
             step, 0 or more. Interpretation S5.
-        floor: Their least value, in half-ranges of the box, above 0, so that a still
-            subject keeps some spread. Interpretation S5.
+        floor: The least standard deviation of the start, in half-ranges of the box,
+            above 0, so that a person who stands still keeps some spread. Interpretation
+            S5.
         root_range_degrees: Range of yaw, pitch and roll to either side of the last
             frame's. Ours.
         tilt: Pitch and roll are "learned" with the latents, or a "box" around upright.
@@ -321,8 +322,8 @@ class Prediction:
             (4).
         start: Name of the start that guesses the first pose if the yaw is unknown,
             "blind" for none. Default: "lookup".
-        relocalise_gap: In footage, frames of a gap after which several starts search
-            all yaws; 0: never. Ours.
+        relocalise_gap: In footage, number of frames without the person after which
+            several starts search all yaws; 0 for never. Ours.
         variant: "paper" follows SAPSO's paper to the letter: the step before the latest
             (Interpretation S12), a box of tilts (S16), and a root that turns about x,
             then y, then z (S3).
@@ -498,11 +499,11 @@ class Predictor:
         first = space.dimensions - len(latents)
         root = space.centre[:first].copy()
         root[1:3] = 0.0  # upright, or tilted as the pose predicts
-        away = space.proposals(np.concatenate([root, latents]))
+        mean = space.proposals(np.concatenate([root, latents]))
         spread = np.full(space.dimensions, self._prediction.floor)
         if self._task.yaw is None:
             spread[0] = 1.0
-        return Start(away, spread, np.zeros(space.dimensions))
+        return Start(mean, spread, np.zeros(space.dimensions))
 
 
 @dataclass(frozen=True, eq=False)
@@ -514,9 +515,8 @@ class SynthesisTracker:
         prior: The fitted prior.
         make: Builds an optimiser from a space, a generator and the number of
             evaluations of its search.
-        next_frame: What happens to the optimiser in the next frame: a new one gets the
-            predicted "start", the same one is kept ("carry"), or a new one searches
-            without a start ("forget").
+        next_frame: The optimiser of the next frame: a new one around the prediction
+            ("start"), the same one ("carry"), or a new one without a start ("forget").
         prediction: The box of a search, its start, and the cost of a pose.
         tilt: The tilt, if it has been learned from the prior and the training already.
 
@@ -549,7 +549,7 @@ class SynthesisTracker:
         """Yield a `Frame` for each observation; only a few are in memory at a time.
 
         Raises:
-            InputError: The budget does not hold one population of the optimiser, or
+            InputError: The budget is smaller than one population of the optimiser, or
                 guessing the first pose took all of it.
         """
         task = self.task
@@ -598,7 +598,7 @@ class SynthesisTracker:
     def _revived(
         self, space: SearchSpace, rng: np.random.Generator
     ) -> Optimiser | None:
-        """Return the filter held by the frames before this track, or None."""
+        """Return the filter whose state the earlier frames carry, or None."""
         for frame in reversed(self.task.before):
             if state := frame.details.get(CARRIED):
                 evaluations = self.task.evaluations

@@ -1,4 +1,4 @@
-"""Checks of the answers of plugins in a run.
+"""Checks of what plugins return during a run.
 
 A broken rule ends the run, with one line that names the plugin and the call.
 """
@@ -102,7 +102,7 @@ class Checked:
         return self._call("feasible", latents)
 
     def _call(self, what: str, *arguments: Any) -> Any:
-        # not `plugin_errors`, which takes as long as a few poses
+        # not `plugin_errors`, whose overhead is as long as rasterising a few poses
         try:
             answer = self._drawn.during(getattr(self.plugin, what), *arguments)
         except BrokenRuleError:
@@ -112,7 +112,7 @@ class Checked:
             raise _broken_by(self.name, what, error) from error
         if self._drawn.poses:
             rule = (
-                f"leave evaluations to the search, got {self._drawn.poses:g} by itself"
+                f"leave evaluations to the search, got {self._drawn.poses:g} of its own"
             )
             raise BrokenRuleError(f"{self.name}: {what} must {rule}")
         return answer
@@ -132,7 +132,7 @@ class Checked:
 
 def check_population(proposals: Any, space: Space, name: str) -> None:
     """Raise BrokenRuleError, beginning with `name`, unless proposals are in the box."""
-    # neither a matrix nor a masked array, which calculate otherwise
+    # not a matrix or a masked array: their operators mean something else
     plain = type(proposals) is np.ndarray
     rule = ""
     if not plain or proposals.shape[1:] != (space.dimensions,):
@@ -213,7 +213,7 @@ class FreeAxes:
 
     @cached_property
     def _reach(self) -> Array:
-        """The largest allowed angles (n,), slow to learn from a large library."""
+        """The largest allowed angles (n,). Cached: a large library takes long."""
         reach = np.zeros(len(self._fixed))
         for angles in self._training:
             off = np.abs(angles[:, self._fixed]).max(axis=0, initial=0.0)
@@ -283,6 +283,7 @@ def check_prior(prior: Latents, training: Array, skeleton: Skeleton, name: str) 
     for poses in (back, prior.inverse_transform(drawn)):
         if rule := axes.broken(np.asarray(poses)):
             raise broken(f"inverse_transform must {rule}")
+    # otherwise a search would have nothing to draw
     if not (
         np.any(feasible)
         or np.any(prior.feasible(prior.transform(sample)))

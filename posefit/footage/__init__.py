@@ -13,11 +13,11 @@ Each row is one step, in one file:
 |---|---|---|
 | what a user names | one source per camera | named.py |
 | a source | its kind, its files and its reader | kinds.py |
-| options of a source | the same, checked for its kind | options.py, uses.py |
+| options of a source | options that are checked for its kind | options.py, uses.py |
 | a source and its options | its scene, by the steps below | source.py |
 | names of images | the frames that they are | numbering.py |
 | a picture | the values by which it marks a person | images.py |
-| values of all masks | the ones that are the person | values.py |
+| values of all masks | which of them mark the person | values.py |
 | images, an .npz or .npy file | a `views.View`: one bit per pixel | readers.py |
 | masks from other tools | one person's masks, not inverted, no holes | cleaning.py |
 | a video file, or one picture per frame | frames at the size of masks | video.py |

@@ -13,8 +13,8 @@ from posefit.silhouette.mask import Silhouette, box_of
 # share of the person's height by which rays through the middles of masks may miss each
 # other
 MAX_MISS = 0.7
-# a person's apparent height, times the real one: crouching or seen from above, and with
-# the arms up
+# limits of a person's apparent height over the real one: crouching or seen from above,
+# and with the arms up
 MIN_APPARENT_HEIGHT = 0.45
 MAX_APPARENT_HEIGHT = 1.9
 

@@ -109,12 +109,12 @@ def read_annotations(
 
 
 class _Content:
-    """What a file states.
+    """The content of a file.
 
     Attributes:
         images: The images by name, all of one size.
-        shapes: The shapes of the people in each image, by its number in the file.
-            Each comes with whether it marks a crowd.
+        shapes: The shapes of the people in each image, by the image's number in the
+            file. Each shape has a flag for crowds.
         guesses: Which category is taken, and what crowds mean.
         warnings: Which annotations belong to no image.
     """
@@ -124,7 +124,7 @@ class _Content:
         try:
             document = json.loads(path.read_bytes())
         except (ValueError, RecursionError):
-            raise self._error("a JSON file, got another or a damaged one") from None
+            raise self._error("a JSON file, got a damaged or another file") from None
         lists = []
         for key in ("images", "annotations", "categories"):
             value = document.get(key) if isinstance(document, dict) else None
@@ -156,9 +156,9 @@ class _Content:
             )
 
     def _check_images(self) -> None:
-        """Find people that are annotated in no image of the file.
+        """Warn of annotations that belong to no image of the file.
 
-        Raises InputError if all of them are.
+        Raises InputError if none of them belongs to an image.
         """
         known = [image["id"] for image in self.images.values()]
         listed = {*known}
@@ -285,7 +285,7 @@ def _key(value: Any) -> Any:
 
 
 def _largest(corners: Any) -> float:
-    """Return the largest number of a polygon; infinite if it is none."""
+    """Return the largest number of a polygon; infinite for anything else."""
     try:
         return float(np.max(np.array(corners, dtype=np.float64), initial=0.0))
     except (TypeError, ValueError):
@@ -340,7 +340,7 @@ def _between(start: Runs, stop: Runs) -> Runs:
     longer = int(steps.argmax()) if steps[0] != steps[1] else 0
     shorter = 1 - longer
     count = int(steps[longer])
-    # in the direction in which the longer side rises, so that both ways are the same
+    # start at the lower end of the longer side: a line is the same in both directions
     low, high = (start, stop) if start[longer] <= stop[longer] else (stop, start)
     points = np.empty((count + 1, 2), dtype=np.int64)
     along = np.arange(count + 1)
@@ -400,5 +400,5 @@ def _decompressed(text: str) -> Runs:
         value = 0
         shift = 0
     if shift:
-        raise ValueError("a text of runs that breaks off")
+        raise ValueError("a text of runs that ends too early")
     return np.array(runs, dtype=np.int64)

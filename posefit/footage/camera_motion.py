@@ -45,7 +45,7 @@ class CameraMotion:
             self._shifts.append(self._shift(image))
 
     def _shift(self, image: Image) -> float:
-        """Return the shift against the first picture, in pixels of small pictures.
+        """Return the shift from the first picture, in pixels of the small pictures.
 
         A moving camera shifts every tile. A tile that a person covers may match
         anywhere. So the camera's shift is one that all textured tiles reach, except for

@@ -24,7 +24,12 @@ from posefit.footage.people import Persons, Tracklet, part_at, paste
 from posefit.footage.scene import Scene
 from posefit.footage.straightening import fitting, straightening
 from posefit.footage.views import View
-from posefit.footage.world import LEAST_HEIGHT, is_open, unit_by_height, world_of
+from posefit.footage.world import (
+    LEAST_HEIGHT,
+    has_guessed_unit,
+    unit_by_height,
+    world_of,
+)
 from posefit.geometry.body import Body
 from posefit.geometry.calibration import Calibration
 from posefit.geometry.camera import Camera
@@ -40,8 +45,9 @@ def combined(
 ) -> Scene:
     """Return the scene of what cameras saw at the same times.
 
-    The person is first searched where the rays through the middles of the masks meet.
-    With a single camera, the distance follows from the person's size in the image.
+    The search for the person begins where the rays through the middles of the masks
+    meet. With a single camera, the distance follows from the person's size in the
+    image.
 
     Args:
         views: What each camera saw.
@@ -146,8 +152,8 @@ def _of_one_size(
         stature: The person's height in metres.
 
     Returns:
-        The cameras, in another unit if that one was a wrong guess, and what to say
-        about it; "" if it was not.
+        The cameras, in another unit if the guessed one was wrong, and a sentence about
+        that, "" if the unit is not changed.
 
     Raises:
         NoPersonError: The cameras cannot all see one person of this size.
@@ -157,10 +163,10 @@ def _of_one_size(
         return [*cameras], ""
 
     def scaled(factor: float) -> list[Camera]:
-        """Return the cameras with all lengths of an open unit times a factor."""
+        """Return the cameras with lengths in a guessed unit times a factor."""
         result = list[Camera]()
         for camera, given in zip(cameras, known, strict=True):
-            if is_open(given):
+            if has_guessed_unit(given):
                 camera = replace(camera, translation=factor * camera.translation)
             result.append(camera)
         return result
@@ -263,7 +269,7 @@ def _difference(misses: Sequence[float], heights: Sequence[Array]) -> float:
 
     Args:
         misses: By how much the rays of both cameras miss each other in each frame.
-        heights: (2,) the person's height by both views in each frame, in the same unit.
+        heights: (2,) the person's height in both views of each frame, in the same unit.
 
     Returns:
         The typical miss in heights, and the spread of the heights' logarithms, added;

@@ -25,7 +25,8 @@ from posefit.silhouette.pieces import people_in
 
 BORDER_FRAMES = 500  # frames whose borders are looked at together
 # share of the person's area: the largest hole that is filled if there is one mask only.
-# A hole between an arm and the trunk shows where the arm is, and no other frame does
+# A hole between an arm and the trunk shows where the arm is, and there is no other
+# frame that does
 MAX_HOLE_ALONE = 0.0005
 
 
@@ -78,6 +79,8 @@ def cleaned(
         store(k, mask & silhouette.valid)
     parts, several = people.chosen(choice, lambda frame: f"frame {view.numbers[frame]}")
     known = view.known
+    # Only a look at all frames shows that there are several people. The masks of the
+    # one who is followed then replace the masks stored above.
     if several:
         warnings.append(f"{view.name}: {several}")
         before = full_planes(count, view.size) if known is None else known
@@ -103,7 +106,7 @@ def _no_person(view: View) -> InputError:
     """Return the error for a view in which no usable mask shows a person."""
     count = len(view)
     came = "one without background" if view.bits[0].any() else "an empty one"
-    rest = f" first, and no other in {count}" if count > 1 else ""
+    rest = f" first, and none with both in {count} frames" if count > 1 else ""
     return InputError(
         f"{view.name}: expected a mask with a person and a background, got {came}{rest}"
     )

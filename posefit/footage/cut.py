@@ -20,16 +20,16 @@ from posefit.silhouette.pieces import RIVAL_AREA
 
 # a person who is cut in all frames for this long may be cut in the others, too
 CUT_SECONDS = 2.0
-# every how many frames to look at: if a person is whole in fewer frames than this, a
-# track is too short to be useful
+# step between the frames that are looked at: if a person is whole in fewer successive
+# frames, a track is too short to be useful
 LOOK_STEP = MIN_DETECTIONS
 
 
 class CutWatch:
     """Watches a pass through a film, frame after frame.
 
-    While everybody in the picture is cut, it cannot tell whether that will change.
-    After two seconds of that it looks ahead, at every eighth frame up to the end.
+    Once everybody in the picture has been cut for two seconds, it looks ahead, at every
+    eighth frame up to the end, to see whether that changes.
     """
 
     def __init__(self, scanner: Scanner) -> None:
@@ -58,11 +58,11 @@ class CutWatch:
         scanner = self._scanner
         segmenter = scanner.segmenter
         if not registry().offer("segmenter", scanner.how.name).still_background:
-            # a network follows people from frame to frame: the pass's own must not get
-            # frames out of order
+            # a network follows people from frame to frame, so the pass's own network
+            # must not be given frames out of order
             segmenter = PersonSegmenter(scanner.video, scanner.how)
         cut = self._cut
-        looked = start  # frames looked at, with those before
+        looked = start  # frames before `start`, and later ones looked at
         before: tuple[Image, Person] | None = None
         frames = scanner.video.frames(scanner.start + start, scanner.stop, LOOK_STEP)
         for image in frames:

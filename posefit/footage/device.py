@@ -74,8 +74,8 @@ def _moved_observation(
 def _moved(silhouette: Silhouette, device: Device | None) -> Silhouette:
     if device == silhouette.device:
         return silhouette
-    # a copy keeps the borders that a larger picture gave to a smaller one, and that
-    # making the silhouette again would lose
+    # a copy keeps the extent that a smaller picture has from the full size; a
+    # silhouette made again would lose it
     moved = copy(silhouette)
     object.__setattr__(moved, "device", device)
     return moved

@@ -57,6 +57,7 @@ def with_identities(
         )
         for person in persons
     ]
+    # poor masks of everyone do not show which person is which
     if all(doubts):
         return scan
     indices = person_indices(persons, scan.view.masks())

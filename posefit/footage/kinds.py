@@ -85,11 +85,12 @@ class Kind(NamedTuple):
 
     medium: Medium
     recognises: Callable[[Place], bool]
-    # (place, frames, label or category, fps) to the view
+    # takes (place, frames, label or category, fps), and returns the view
     view: Callable[[Any, Range, Any, float | None], View] | None = None
-    # (place, fps, width) to the film, scaled down to the width
+    # takes (place, fps, width), and returns the film, scaled down to the width
     film: Callable[[Any, float | None, int], Video] | None = None
-    # (place, fps) to the number of its first frame; None if frames are counted from 0
+    # takes (place, fps), and returns the number of the first frame; None if frames are
+    # counted from 0
     first: Callable[[Any, float | None], int] | None = None
     has_categories: bool = False  # whether a label may be a category's name
 

@@ -20,7 +20,7 @@ MOST_MISSING = 9.0
 DIGITS = 18
 # most objects or cameras that the last number of names counts, if it is not the frame
 MOST_OBJECTS = 8
-# words before a number that counts no frames
+# words before a number that does not count frames
 _NO_FRAME = re.compile(
     r"(^|[^a-z])(cam(era)?|view|obj(ect)?|person|id|inst(ance)?|track|player|subject"
     r"|label)[^a-z]*$",
@@ -96,7 +96,7 @@ def numbered(images: Sequence[Path], name: str) -> Numbered:
     rising = bool((steps > 0).all())
     others = {(*part[:column], *part[column:][1:]) for part in parts}
     if len(others) > 1 or not rising:
-        listed = f"{name}: the frames come as listed, not as numbered"
+        listed = f"{name}: the frames are in the listed order, not by their numbers"
         return Numbered(list(images), [] if rising else [listed])
     step = int(np.gcd.reduce(steps))
     missing = int((steps // step - 1).sum())
@@ -216,7 +216,7 @@ def _spread(places: Mapping[int, Path], numbers: range, name: str) -> Numbered:
     if missing:
         guesses.append(
             f"{name}: {missing} of the frames {numbers[0]} to {numbers[-1]} are "
-            "missing, and are held"
+            "missing, and the pose is held"
         )
     return Numbered(files, guesses, numbers)
 

@@ -25,7 +25,7 @@ MAX_STEP = 1.0
 MAX_GAP_SECONDS = 1.0  # a person who is hidden for longer counts as another one
 # share of the last step, size and colours that is kept with each frame
 MEMORY_SHARE = 0.8
-# share of a person's expected outline: a blob that covers more of it shows them
+# share of a person's expected outline: a blob that covers more of it shows the person
 COVERED_SHARE = 0.3
 # share of the height by which a person may be off their expected outline
 OUTLINE_SLACK = 0.04
@@ -36,8 +36,8 @@ CLEAR_FACTOR = 2.0
 MIN_DETECTIONS = 8  # frames that show a person alone; fewer may be noise
 # heights: the distance that one grey level of different colour adds
 COLOUR_DISTANCE = 0.01
-AREA_DISTANCE = 0.5  # heights: the distance that an area e times as large adds
-HALVING_SECONDS = 1.0  # a gap of this many seconds halves what a distance counts
+AREA_DISTANCE = 0.5  # heights: the distance added by an area larger by the factor e
+HALVING_SECONDS = 1.0  # a gap of this many seconds halves the weight of a distance
 UNREACHABLE = 1e6  # heights: replaces infinity, which the assignment does not accept
 
 
@@ -183,7 +183,7 @@ class People:
 
     def __init__(self, fps: float) -> None:
         self.tracklets: list[Tracklet] = []
-        self.active: list[Tracklet] = []  # who may be in the next frame
+        self.active: list[Tracklet] = []  # people who may be in the next frame
         self._frame = -1
         self._fps = fps
 
@@ -318,7 +318,7 @@ class People:
             number = 1 + int(np.argmin(away))
         if not 1 <= number <= len(persons):
             raise NoPersonError(
-                f"person must be 1 to {len(persons)}, as many people as there are, "
+                f"person must be 1 to {len(persons)}, the number of people, "
                 f"got {number}"
             )
         if len(persons) == 1:
@@ -453,7 +453,8 @@ def person_indices(persons: Persons, masks: Iterable[Mask]) -> list[int | None]:
     """
     nobody = -1  # for a mask that shows nobody, until it gets a person
     result = list[int | None]()
-    several = list[bool]()  # of masks on several people: whether they cover several
+    # whether the mask covers several people, for each frame that shows several
+    several = list[bool]()
     for k, mask in enumerate(masks):
         present = [part_at(parts, k) for parts in persons]
         pixels = [

@@ -117,6 +117,7 @@ class FrameQuality:
         )
         typical = float(np.median(self._areas)) if self._areas else float(person.area)
         jitter = abs(person.area / typical - 1.0) if typical else 0.0
+        # other masks would shift the area that the next ones are compared with
         if likely:
             self._areas.append(person.area)
         if whole:
@@ -167,7 +168,7 @@ class FrameQuality:
 
 
 def changed_pixels(image: Image, earlier: Image) -> Mask:
-    """Return which pixels (height, width) changed between two pictures, less noise."""
+    """Return which pixels (height, width) changed between two pictures, denoised."""
     blue, green, red = cv2.split(cv2.absdiff(image, earlier))
     largest = cv2.max(cv2.max(blue, green), red)
     changed = np.asarray(largest > MOVING_LEVELS, dtype=np.uint8)
@@ -227,9 +228,10 @@ def verdict(
 ) -> Verdict | None:
     """Return what is wrong with the masks of a video; None if nothing is.
 
-    Masks are refused if their size jumps, and much moves outside them, few frames are
-    usable, or most masks are in pieces. Motion outside alone may be another person, and
-    a jumping size alone clothes like the background; they are warnings.
+    Masks are refused if their size jumps and, in addition, much moves outside them, few
+    frames are usable, or most masks are in pieces. Motion outside the masks alone may
+    be another person, and a jumping size alone may be clothes that look like the
+    background, so that either is only a warning.
 
     Args:
         rows: The rows of `FrameQuality`.
@@ -292,7 +294,7 @@ def at_edge(cut: int, count: int) -> str:
     `count` frames were looked at.
     """
     return (
-        "expected a person who is whole in the picture, got one at its edge in "
+        "expected a person who is whole in the picture, got one cut by the edge in "
         f"{cut} of {count} frames"
     )
 

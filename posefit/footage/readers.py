@@ -144,7 +144,7 @@ def _marks(
             yield marks
         if remaining:
             raise InputError(
-                f"{file}: expected an image ({FORMATS}), got another or a damaged file"
+                f"{file}: expected an image ({FORMATS}), got a damaged or another file"
             )
 
 
@@ -227,7 +227,7 @@ def _stated_first(name: str, arrays: Arrays) -> int:
 def _stated_usable(
     name: str, arrays: Arrays, start: int, stop: int
 ) -> NDArray[np.bool_]:
-    """Return which frames from start to stop arrays call usable; all by default.
+    """Return which frames from start to stop are marked as usable; all by default.
 
     Raises InputError if none is.
     """

@@ -76,7 +76,7 @@ class Scanner:
 
         Args:
             progress: Shows the progress of the pass.
-            changed: Returns the picture of a frame that the segmenter gets, given the
+            changed: Returns the picture that the segmenter gets for a frame, given the
                 frame's index and its picture.
             watch: Gets each frame's index and its people; it may end the pass.
         """
@@ -144,8 +144,8 @@ class Scanner:
 class _Rows:
     """The rows of quality.csv of all frames.
 
-    Each frame has one of every person who is expected in it, one of its largest blob,
-    and one of an empty mask.
+    Each frame has a row for every person who is expected in it, one for its largest
+    blob, and one for an empty mask.
     """
 
     def __init__(self, scanner: Scanner) -> None:
@@ -185,7 +185,7 @@ class _Rows:
             if tracklet in present:
                 person = _alone(tracklet, present, blobs, k)
             tracklet.add_row(k, self._row(quality, image, person, k))
-        # those of people who are lost are freed, or memory would grow with noise
+        # comparisons of people who are lost are freed, or memory would grow with noise
         self._of_people = qualities
         self.blanks.append(self._row(self._of_blanks, image, empty, k))
         self.largest.append(self._row(self._of_largest, image, blobs[0], k))

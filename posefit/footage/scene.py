@@ -103,6 +103,7 @@ def synthetic(
             Camera.framing(joints, radii, float(azimuth), size) for azimuth in azimuths
         ]
     observations = rendered(motion, body, cameras)
+    # only at both ends, because each frame that is checked must be rendered
     for k in (0, len(motion) - 1):
         if not all(silhouette.mask.any() for silhouette in observations[k].silhouettes):
             number = motion.first + k

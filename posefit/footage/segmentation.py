@@ -59,7 +59,7 @@ class Segmentation:
             how: How to segment the person.
             frames: Which frames to read.
             among: A second extraction, which finds all people. It tells which of them
-                it is that the segmenter of `how` reports.
+                the segmenter of `how` reports.
 
         Raises:
             InputError: The extraction or the frames do not fit the video.
@@ -121,8 +121,8 @@ class Segmentation:
         if not self._missing:
             reason = advice(self.how.name, learned=learned)
         return (
-            f"{self.video.path}: expected a person who moves before a still background,"
-            f" got none in any frame{reason}"
+            f"{self.video.path}: expected a person who moves in front of a still"
+            f" background, got none in any frame{reason}"
         )
 
     def _warnings(self, followed: _Followed, doubt: Verdict | None) -> list[str]:

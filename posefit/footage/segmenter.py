@@ -1,4 +1,4 @@
-"""Find the people in one frame of a video after the other."""
+"""Find the people in a video, frame by frame."""
 
 import math
 from collections.abc import Iterator
@@ -196,7 +196,7 @@ def _ignored(path: str | Path | None, size: tuple[int, int]) -> Mask | None:
     image = read_image(path, grey=True)
     if image is None:
         raise InputError(
-            f"{path}: expected an image of what to ignore, got another or a damaged "
+            f"{path}: expected an image of what to ignore, got a damaged or another "
             "file"
         )
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_NEAREST) > BRIGHT)

@@ -323,8 +323,8 @@ def body_of(
         unit: Unit of the skeleton file.
 
     Returns:
-        The body, warnings about the file, and what was guessed. A given height replaces
-        what both of them are about.
+        The body, warnings about the file, and what was guessed. With a given height
+        there are neither warnings nor guesses, because both are about sizes.
     """
     average = Acclaim(built_in.average_skeleton(), 1.0)
     acclaim = average if asf is None else parse_asf(asf, unit)

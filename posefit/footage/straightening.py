@@ -70,7 +70,7 @@ def undistorted(
         valid = silhouette.valid.astype(np.uint8)
         share = cv2.remap(levels, *maps, cv2.INTER_LINEAR)
         covered = cv2.remap(valid, *maps, cv2.INTER_NEAREST)
-        # interpolated between four pixels, the outline is where the person has a half
+        # after interpolation, the outline is where the person has half of a pixel
         bits[k] = np.packbits(share > 127)
         known[k] = np.packbits(covered != 0)
     landmarks = view.landmarks

@@ -131,7 +131,7 @@ class ValueCounts:
         if self.highest > limit:
             guess = f"{words}, and what is above {limit:g} is not"
             return _between(threshold, limit), [guess]
-        return above(threshold), [f"{words}, what is between is an edge"]
+        return above(threshold), [f"{words}, and values in between are edges"]
 
     def _labelled(self, label: int, name: object) -> Classifier:
         """Return the classifier of a label that the user gave."""

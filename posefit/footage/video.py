@@ -270,7 +270,7 @@ def _picture(source: tuple[Path, int] | Image) -> Image:
     file, page = source
     image = read_image(file, grey=False, page=page)
     if image is None:
-        raise InputError(f"{file}: expected a picture, got another or a damaged file")
+        raise InputError(f"{file}: expected a picture, got a damaged or another file")
     return image
 
 
@@ -303,8 +303,8 @@ def _read_head(path: Path) -> _Head:
         read, image = capture.read()
         if not read:
             raise InputError(
-                f"{path}: expected a video that OpenCV can read, got another or a "
-                "damaged file: convert it with ffmpeg -i FILE -c:v libx264 NEW.mp4"
+                f"{path}: expected a video that OpenCV can read, got a damaged or "
+                "another file: convert it with ffmpeg -i FILE -c:v libx264 NEW.mp4"
             )
         fps = float(capture.get(cv2.CAP_PROP_FPS))
         claimed = float(capture.get(cv2.CAP_PROP_FRAME_COUNT))

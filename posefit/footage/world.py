@@ -100,7 +100,7 @@ def unit_of_heights(ratio: float) -> Unit:
     return min(GUESSED_UNITS, key=lambda unit: abs(np.log(ratio * METRES[unit])))
 
 
-def is_open(camera: Camera | Calibration) -> bool:
+def has_guessed_unit(camera: Camera | Calibration) -> bool:
     """Return whether the unit of a camera's lengths is a guess."""
     return isinstance(camera, Calibration) and camera.scale != "metres"
 
@@ -108,12 +108,13 @@ def is_open(camera: Camera | Calibration) -> bool:
 class _Fitted(NamedTuple):
     """The unit of calibrations that fits the person's height."""
 
-    factor: float  # to multiply lengths with
+    factor: float  # on the lengths of the calibrations
     guess: str  # what to say about it; "" if the unit guessed before fits
 
 
-# takes a factor for the lengths of calibrations whose unit is open; returns by how much
-# rays then miss each other, and the person's height in each view, as `apparent_size`
+# takes a factor for the lengths of calibrations whose unit is a guess; returns by how
+# much rays then miss each other, and the person's height in each view, as
+# `apparent_size`
 Measured = Callable[[float], tuple[float, Array]]
 
 
@@ -126,19 +127,19 @@ def unit_by_height(
     """Return the unit in which the person's height is about right.
 
     Args:
-        measured: Measures the person, given the factor by which the lengths of
-            calibrations with an open unit are multiplied.
+        measured: Measures the person, given the factor on the lengths of calibrations
+            whose unit is a guess.
         known: The cameras. A calibration may state that it is in metres, or that its
             unit may be any length if no usual one fits.
         metres: The unit guessed before, in metres.
         stature: The person's height in metres.
     """
-    if not any(is_open(camera) for camera in known):
+    if not any(has_guessed_unit(camera) for camera in known):
         return _Fitted(1.0, "")
     _, tall = measured(1.0)
     height = float(np.median(tall))
-    all_open = all(is_open(camera) for camera in known)
-    if not all_open:
+    all_guessed = all(has_guessed_unit(camera) for camera in known)
+    if not all_guessed:
         unit = _unit_beside_known(measured, metres, stature)
     elif height > 0.0:
         unit = unit_of_heights(height / metres / stature)
@@ -147,7 +148,7 @@ def unit_by_height(
         return _Fitted(1.0, "")
     factor = METRES[unit] / metres
     is_free = any(getattr(camera, "scale", None) == "free" for camera in known)
-    if is_free and all_open and disagreement(*measured(factor), stature):
+    if is_free and all_guessed and disagreement(*measured(factor), stature):
         factor = stature / height
         length = f"{factor * metres:.4g} m"
         guess = f"the calibration's unit is {length}, by the person's height"

@@ -18,7 +18,7 @@ from posefit.silhouette.sharing import parts_of, work_through
 SCALE = 100.0  # S
 BETA = 0.5  # beta
 
-# if only the areas are needed
+# passed in place of images if only the areas are needed
 _NO_IMAGES: Bits = np.empty((0, 0, 0), dtype=np.uint64)
 T = TypeVar("T")
 

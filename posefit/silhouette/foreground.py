@@ -1,4 +1,4 @@
-"""From video frames to people's masks: background models, cleaning, no holes.
+"""From video frames to masks of people: background models, cleaning, hole filling.
 
 Frames and backgrounds are (height, width, 3) uint8. Frames are not kept, so a video may
 have any length.
@@ -19,9 +19,9 @@ from posefit.silhouette.pieces import people_in
 Image = NDArray[np.uint8]  # (height, width, 3)
 
 SPREADS = 4.0  # a pixel is foreground this many standard deviations from the background
-MIN_DIFFERENCE_LEVELS = 18.0  # and at least this many grey levels
+MIN_DIFFERENCE_LEVELS = 18.0  # and differs by at least this many grey levels
 SHADE = (0.45, 0.95)  # a shadow keeps this share of the background's brightness
-TINT = 14.0  # and, after scaling, its colour to within this many grey levels
+TINT = 14.0  # a shadow keeps its colour, after scaling, to within this many levels
 NOISE = 3  # pixels: the side of the square whose majority decides about a pixel
 SPECK = 0.004  # share of the image's height: an opening removes smaller specks
 GAP = 0.012  # share of the image's height: a closing joins smaller gaps

@@ -115,7 +115,7 @@ def add_mismatch(areas, scale, beta, costs):
         r = float(areas[i, 0])
         b = float(areas[i, 1])
         y = float(areas[i, 2])
-        # Interpretation S2: an empty denominator makes its term 1.
+        # Interpretation S2: a term with the denominator 0 is 1.
         spilled = b / (b + y) if b + y > 0.0 else 1.0
         missed = r / (r + y) if r + y > 0.0 else 1.0
         costs[i] += scale * ((1.0 - beta) * spilled + beta * missed)  # SAPSO (4)

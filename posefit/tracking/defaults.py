@@ -1,6 +1,6 @@
 """The defaults of a track, which `completed` fills in once.
 
-The functions that it calls get complete options.
+All later steps get complete options.
 """
 
 from typing import Any

@@ -74,6 +74,7 @@ def evaluate(
     modes = track_modes(skeleton, posteriors)
     stay = None
     if tracked.stay is not None:
+        # counted from the scene's first frame so far, and as filmed in the log
         first, last = tracked.stay
         stay = scene.first + first, scene.first + last
     log = TrackingLog(

@@ -112,12 +112,12 @@ def initialise(
         few = f"{count} are too few"
         if count < body_frames:
             few = f"{count} of them show enough of the person"
-        needed = f"at least {MIN_BODY_FRAMES} are needed; it is the average"
+        needed = f"at least {MIN_BODY_FRAMES} are needed; the average build is used"
         progress.log(f"no build is fitted to {body_frames} frames: {few}, {needed}")
     elif body_frames:
         progress.log(f"fitting the person's build to {body_frames} frames")
         height = options.height
-        # the masks of one camera do not show how tall a person is at what distance
+        # the masks of one camera do not tell a tall person from a near one
         if height is None and len(scene.cameras) == 1 and task.translation == "aligned":
             height = task.body.stature
         drawn = PoseCount()
@@ -184,6 +184,7 @@ def fitted_build(
         rng = np.random.default_rng(seed)
         return list(follow(replace(task, body=body), chosen, rng))
 
+    # before the build, which would otherwise make up for errors of the calibration
     if scene.cameras_turn:
         filmed = replace(
             scene, body=task.body, observations=chosen, count=len(chosen), fps=task.fps

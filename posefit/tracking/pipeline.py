@@ -264,10 +264,10 @@ def _of_one_picture(
 def _smoothed(
     tracked: Smoothed, task: Task, beta: float, progress: Progress
 ) -> Smoothed:
-    """Return a smoothed track, with legs exchanged where smooth ones then fit better.
+    """Return a smoothed track, with legs exchanged where it then fits better.
 
-    Legs are only doubtful before one camera, and in footage long enough to judge them.
-    `beta` is the weight in the cost.
+    Legs are doubtful only in footage by a single camera, which must be long enough to
+    judge them. `beta` is the weight in the cost.
     """
     borders = Borders(tracked.scene.observations)
     smoothed = smooth(*tracked, beta, borders)
@@ -282,7 +282,7 @@ def _smoothed(
     if exchanged.any():
         progress.log(
             f"legs exchanged in {exchanged.sum()} frames,"
-            " where smooth ones then fit better"
+            " where the smoothed track then fits better"
         )
     return smoothed
 

@@ -90,7 +90,7 @@ def polished(
     def cost(poses: Array, places: Array) -> Array:
         return pose_costs(*scene, poses, places, beta)[0]
 
-    # poses of the library are taken unchanged, because the prior may not know them
+    # poses of the library are not projected: the prior may be unable to represent them
     modes, looking = looked_up(task, observation)
     count = race_count(evaluations - looking)
     modes = modes[: count // 2]
@@ -129,7 +129,7 @@ def polished(
 
 
 def beyond_prior(prior: Latents, skeleton: Skeleton, pose: Array) -> str:
-    """Return a warning if a prior does not know a pose (66,), or ""."""
+    """Return a warning if a prior cannot represent a pose (66,), or ""."""
     latents = np.clip(prior.transform(pose[None, 3:]), prior.low, prior.high)
     nearest = pose[None].copy()
     nearest[:, 3:] = prior.inverse_transform(latents)

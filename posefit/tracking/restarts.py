@@ -95,7 +95,7 @@ def independent(rng: np.random.Generator) -> np.random.Generator:
     return np.random.default_rng(deepcopy(rng).integers(0, 2**63, 4))
 
 
-# Before the first frame.
+# Restarts before the first frame.
 
 
 def usable_observations(
@@ -113,8 +113,8 @@ def usable_observations(
 def first_shown_whole(observations: Sequence[Observation]) -> int:
     """Return the first frame in which the most cameras show the whole person.
 
-    In such a picture its edge cuts nothing off. If no camera ever shows the whole
-    person, return the first usable frame.
+    It shows the whole person if the edge of its picture cuts nothing off. If no camera
+    ever does, return the first usable frame.
     """
     best = 0
     most = 0.0
@@ -254,7 +254,7 @@ def after(task: Task, frame: Frame) -> Task:
     return replace(first, before=(with_carried(frame, None),))
 
 
-# During a track.
+# Restarts during a track.
 
 
 def relocalised(
@@ -270,7 +270,7 @@ def relocalised(
     turned unseen. It also happens if all costs of half a second are half as high again
     as is typical since the last relocalisation. The restarts and the track as it is are
     compared over about a second of the coming observations, and the cheapest one
-    continues. The frame gets the evaluations and the time of them all.
+    continues. The frame gets the evaluations and the time of all that were compared.
 
     Args:
         task: The task.
@@ -291,6 +291,7 @@ def relocalised(
         if observation.usable and (latest := watch.due()) is not None:
             window = coming.ahead(1 + (TRIAL_FRAMES - 1) * TRIAL_STRIDE)
             seeds = independent(rng).integers(0, 2**32, 2).tolist()
+            # the track may be wrong in every way: only its place is kept
             unconstrained = replace(
                 task,
                 yaw=None,
@@ -373,7 +374,7 @@ class _Watch:
         return self._latest if costly or self._missing >= self._gap else None
 
 
-# Several hypotheses.
+# Initial guesses of several hypotheses.
 
 # The initial guesses of the hypotheses after the first one, in turn. The ones that are
 # mistaken for the right pose most often come first.
@@ -431,10 +432,10 @@ def initial_guess(
     return name, replace(after(task, replace(first, pose=poses[name])), before=())
 
 
-# After the last frame. A silhouette hardly distinguishes a body that faces the camera
-# from its reflection, which faces away. A track that confuses the two for a while spins
-# when it changes over, and when it changes back. Each of its frames then votes for one
-# of the two.
+# Tracking again after the last frame. A silhouette hardly distinguishes a body that
+# faces the camera from its reflection, which faces away. A track that confuses the two
+# for a while spins when it changes over, and when it changes back. Each of its frames
+# then votes for one of the two.
 
 
 def retrack_spins(
@@ -480,6 +481,7 @@ def retrack_spins(
     longest = max(steady_runs, key=lambda run: run[1] - run[0])
     stay = best_ends(frames, *longest, task.fps)
     first, last = stay
+    # without this limit the tracker would find the same spins again
     steady = replace(task, fastest_turn=MAX_TURN_RATE)
 
     def followed_from(number: int, steady: Task, rows: range) -> list[Frame]:
@@ -497,6 +499,7 @@ def retrack_spins(
     cheap = mean_cost(new, usable) < SPIN_TOLERANCE * mean_cost(frames, usable)
     better = cheap and spins(new) < before
     new = with_total_effort([frames, new], int(better))
+    # frames that were not tracked again have only their own effort
     new[first : last + 1] = frames[first : last + 1]
     return tracked._replace(frames=new, stay=stay if better else None)
 

@@ -170,8 +170,8 @@ def trajectory_cost(
 
     Args:
         frames: The frames of the trajectory.
-        usable: Whether each shows enough of the person. The others are held and count
-            for nothing, unless all are.
+        usable: Whether each shows enough of the person. The others are held, and count
+            only if no frame is usable.
         skeleton: The person's skeleton.
         fps: Frames a second.
         speed: The typical speed, metres a second.

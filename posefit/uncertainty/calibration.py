@@ -14,7 +14,7 @@ from posefit.errors import InputError
 from posefit.geometry.skeleton import ANGLES, JOINTS
 
 LEVELS = (0.5, 0.8, 0.95)  # of intervals
-MAIN_LEVEL = LEVELS.index(0.8)  # the index of the level that is drawn and judged
+MAIN_LEVEL = LEVELS.index(0.8)  # index of the level that is displayed and judged
 # ours: left and right are unknown if they are exchanged with at least this probability
 SECOND_SIDE = 0.2
 DIGITS = 6  # of numbers in a file

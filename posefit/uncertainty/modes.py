@@ -303,7 +303,8 @@ def clusters_of(
     Returns:
         The weight, the medoid and all rows of each cluster.
     """
-    # a pose between two modes must not be a centre, so the heaviest place comes first
+    # a pose between two modes must not be a centre, so the next centre is
+    # where most weight is near
     near = distances <= apart
     remaining = weights > 0.0
     centres: list[int] = []
@@ -351,7 +352,7 @@ def mirrored_gain(targets: Array, joints: Array) -> Array:
         joints: The joints (T, 27, 3) in metres.
 
     Returns:
-        The mean distance of the joints minus the one of the mirrored joints (T,),
+        The mean distance of the joints minus that of the mirrored joints (T,), in
         metres.
     """
     targets = root_centred(targets)

@@ -26,7 +26,7 @@ PARTS: Mapping[str, Sequence[str]] = {  # joints, named after the bones that end
     "arms": ("humerus", "radius", "wrist", "hand"),
 }
 # Standard deviations along each axis in millimetres, about the root and in the world.
-# The three numbers are by one camera, by two and by more.
+# The three numbers are for one camera, for two, and for more.
 SHARED_MM: Mapping[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
     "pelvis": ((0, 0, 0), (0, 35, 25)),
     "hips": ((0, 15, 15), (0, 35, 25)),

@@ -68,7 +68,7 @@ def test_a_broken_rule_is_named_with_the_plugin() -> None:
             fails,
             r"ask must not fail, got ZeroDivisionError: division by zero \(test_validation.py:[0-9]+\)",
         ),
-        (peeks, "ask must leave evaluations to the search, got 40 by itself"),
+        (peeks, "ask must leave evaluations to the search, got 40 of its own"),
         (exits, "ask must not end the program, got SystemExit: 0"),
     ]
     for answer, rule in rows:

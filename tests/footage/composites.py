@@ -1,4 +1,4 @@
-"""Videos of a person in patterned clothes, rendered before a still background: passing by, or always there."""
+"""Videos of a person in patterned clothes, rendered in front of a still background: passing by, or always there."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -137,7 +137,7 @@ def test_a_scene_that_was_reconstructed_has_the_scale_of_the_person(
 
 @each("unit", ["m", "cm", "mm", "inch"])
 @each("order", [(0, 1), (1, 0)])
-def test_a_camera_whose_unit_is_known_keeps_it_beside_one_whose_unit_is_open(
+def test_a_camera_whose_unit_is_known_keeps_it_beside_one_whose_unit_is_guessed(
     tmp_path: Path, unit: Any, order: tuple[int, int]
 ) -> None:
     stated = Calibration.of(camera(AZIMUTHS[0]), "a")

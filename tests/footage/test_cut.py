@@ -69,7 +69,7 @@ def test_a_person_who_is_cut_in_all_frames_is_refused_soon(
         scene_of([path], options)
     looked = 50 + len(range(50, FRAMES, 8))
     assert str(caught.value) == (
-        f"{path}: expected a person who is whole in the picture, got one at its edge "
+        f"{path}: expected a person who is whole in the picture, got one cut by the edge "
         f"in {looked} of {looked} frames looked at, of {FRAMES}"
     )
     assert len(asked) == looked
@@ -78,7 +78,7 @@ def test_a_person_who_is_cut_in_all_frames_is_refused_soon(
     assert len(view) == FRAMES
     assert doubt is not None
     assert doubt.text == (
-        f"{path}: expected a person who is whole in the picture, got one at its edge "
+        f"{path}: expected a person who is whole in the picture, got one cut by the edge "
         f"in {FRAMES} of {FRAMES} frames"
     )
 

@@ -212,7 +212,7 @@ def test_the_command_prints_a_summary(filmed: Film, tmp_path: Path) -> None:
         (["--width", "3"], "width must lie in 36 to 8192 pixels, got 3"),
         (
             ["--frames", "0:8", "--background", "0:12"],
-            "expected a person who moves before a still background",
+            "expected a person who moves in front of a still background",
         ),
     ],
 )

@@ -360,7 +360,7 @@ def test_a_video_that_changes_its_size_is_named(filmed: Film) -> None:
         ),
         (
             ["VIDEO", "--frames", "0:5"],
-            "expected a person who moves before a still background, got none in any frame",
+            "expected a person who moves in front of a still background, got none in any frame",
         ),
     ],
 )

@@ -382,7 +382,7 @@ def test_an_unknown_person_number_is_reported_in_one_line(tmp_path: Path) -> Non
     masks = [blob((40, 60)) | blob((180, 60))] * 4
     path = stack(tmp_path / "a.npz", masks)
     error = error_of("track", path, "--person", "3", *QUICK)
-    assert "person must be 1 to 2, as many people as there are, got 3" in error
+    assert "person must be 1 to 2, the number of people, got 3" in error
     assert "person applies only to footage" in error_of(
         "track", "walk", "--person", "2"
     )

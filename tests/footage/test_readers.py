@@ -108,7 +108,7 @@ def test_missing_numbers_are_unknown_frames(walk: list[Any], tmp_path: Path) -> 
     ] == masks.usable.tolist()
     np.testing.assert_array_equal(masks.silhouette(7).mask, walk[4])
     assert masks.guesses == [
-        f"{tmp_path}: 3 of the frames 7 to 15 are missing, and are held"
+        f"{tmp_path}: 3 of the frames 7 to 15 are missing, and the pose is held"
     ]
     assert len(read_masks(tmp_path, (3, 7))) == 4
     clean = cleaned(masks)
@@ -128,12 +128,12 @@ def test_missing_numbers_are_unknown_frames(walk: list[Any], tmp_path: Path) -> 
         (
             ["f0.png", "f5.png", "f15.png"],
             4,
-            "1 of the frames 0 to 15 are missing, and are held",
+            "1 of the frames 0 to 15 are missing, and the pose is held",
         ),
         (
             ["f3.png", "f1.png", "f2.png"],
             3,
-            "the frames come as listed, not as numbered",
+            "the frames are in the listed order, not by their numbers",
         ),
         (
             ["f1.png", "f900001.png", "f900002.png"],
@@ -143,7 +143,7 @@ def test_missing_numbers_are_unknown_frames(walk: list[Any], tmp_path: Path) -> 
         (
             ["a-1-1.png", "a-1-2.png", "a-2-1.png"],
             3,
-            "the frames come as listed, not as numbered",
+            "the frames are in the listed order, not by their numbers",
         ),
         (["a.png", "b.png"], 2, None),
         (["1.png", "2.png", "3.png"], 3, None),

@@ -352,7 +352,7 @@ def rows(
             "mixture",
             True,
             True,
-            "got one at its edge in 20 of 20 frames",
+            "got one cut by the edge in 20 of 20 frames",
         ),
         (rows(pieces=2), "median", True, None, ""),
         (

@@ -169,7 +169,7 @@ def test_a_picture_that_is_missing_is_held(filmed: Film, tmp_path: Path) -> None
     assert scene.count == 60
     assert not any(scene.observations[k].usable for k in (30, 31))
     assert any(
-        "2 of the frames 0 to 59 are missing, and are held" in guess
+        "2 of the frames 0 to 59 are missing, and the pose is held" in guess
         for guess in scene.guesses
     )
 

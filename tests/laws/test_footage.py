@@ -381,7 +381,9 @@ def test_frames_of_cameras_are_paired_by_number(
         assert any("which all cameras have" in guess for guess in scene.guesses)
     else:
         assert (scene.first, scene.count) == (0, 8)
-        assert any("are missing, and are held" in guess for guess in scene.guesses)
+        assert any(
+            "are missing, and the pose is held" in guess for guess in scene.guesses
+        )
     for number in both:
         shown = scene.observations[number - lowest - scene.first].silhouettes
         for silhouette, azimuth in zip(shown, VIEWS, strict=True):

@@ -74,7 +74,7 @@ def test_an_honest_tracker_is_not_changed() -> None:
         ),
         (
             planted.SpendsInSecret,
-            "frame 0 must say how many poses it drew, 20,001, got 100 (12 such frames)",
+            "frame 0 must count all poses it rasterised, 20,001, got 100 (12 such frames)",
         ),
         (reporting(cost=0.0, trace=np.zeros((1, 2))), ", got 0 (12 such frames)"),
         (
@@ -122,7 +122,7 @@ def test_a_track_has_the_warnings_and_the_corrected_figures() -> None:
     )
     uncounted, beyond = result.summary["warnings"]
     assert (
-        "frame 0 must say how many poses it drew, 20,001, got 100 (3 such frames)"
+        "frame 0 must count all poses it rasterised, 20,001, got 100 (3 such frames)"
         in uncounted
     )
     assert (

@@ -122,7 +122,7 @@ def test_restarts_see_small_pictures_and_the_best_goes_on_in_the_whole_one(
         (
             12,
             4,
-            "no build is fitted to 4 frames: 4 are too few, at least 5 are needed; it is the average",
+            "no build is fitted to 4 frames: 4 are too few, at least 5 are needed; the average build is used",
         ),
         (
             3,

@@ -195,7 +195,7 @@ def test_lines_of_a_body_start_and_end_at_its_joints(
 
 
 def test_a_long_note_is_broken_into_lines_of_one_size() -> None:
-    note = "the picture's border cuts the mask above and below, and 3 more signs speak against it"
+    note = "the picture's border cuts the mask above and below, and 3 more signs count against it"
     lines = wrapped(note, 300, 0.65)
     assert " ".join(lines) == note
     assert max(width_of(line, 0.65) for line in lines) <= 300

@@ -1,4 +1,4 @@
-"""Legs of people who stand before one camera: straighter from the front, bent where the masks show it."""
+"""Legs of people who stand in front of one camera: straighter from the front, bent where the masks show it."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -151,7 +151,7 @@ def test_a_body_covers_half_of_what_moves() -> None:
         (
             {"cropped": 1.0, "training_mm": 218.0},
             "do not use: the picture's border cuts the mask above and below in 100% of the frames: masks cropped to "
-            "the person do not show where they are, and 1 more sign speaks against it",
+            "the person do not show where they are, and 1 more sign counts against it",
         ),
         ({"iou": 0.41}, "do not use: the body and the mask overlap by only 41%"),
         (
@@ -176,7 +176,7 @@ def test_a_body_covers_half_of_what_moves() -> None:
         ({"frames": 2}, "doubtful: only 2 frames to judge the person by"),
         (
             {"unknown": 0.3, "lost": 0.4},
-            "doubtful: the person is lost in 40% of the frames, and 1 more sign speaks against it",
+            "doubtful: the person is lost in 40% of the frames, and 1 more sign counts against it",
         ),
     ],
 )
@@ -225,7 +225,7 @@ def test_a_sign_speaks_against_a_track_from_the_pages_limits_on() -> None:
 def test_a_track_without_a_sign_against_it_is_good() -> None:
     assert signs_against(FINE) == []
     assert sentence(FINE, []).startswith(
-        "Trust: good. No sign speaks against it: size 1.80 m, the fitted body's 1.80 m, "
+        "Trust: good. No sign counts against it: size 1.80 m, the fitted body's 1.80 m, "
     )
     unknown = FINE | dict.fromkeys(SIGNS) | {"size_m": None}
     assert signs_against(unknown) == []
@@ -274,7 +274,7 @@ def test_several_cameras_show_the_size_and_one_cannot() -> None:
     assert trust.unknown_signs["size_ratio"] == ONE_CAMERA
     for name in ("lost", "unknown", "interval_mm"):
         assert trust.unknown_signs[name] == "the method does not report it"
-    assert trust.unknown_signs["training_mm"] == "no motion was learned from"
+    assert trust.unknown_signs["training_mm"] == "the method learned from no motion"
     assert ONE_CAMERA in trust_line(asdict(trust))
 
 

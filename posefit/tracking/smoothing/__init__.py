@@ -6,5 +6,5 @@
 | the likeliest path of a root and two legs; which foot stands | path.py |
 | poses, path and build fitted to the contours of the masks | contours.py |
 | legs straightened where masks of one camera allow it | standing.py |
-| legs exchanged where one camera takes the one for the other | legs.py |
+| legs exchanged where one camera mistakes one for the other | legs.py |
 """

@@ -53,13 +53,13 @@ from posefit.tracking.smoothing.path import (
 
 # Step of a difference quotient by the logarithm of a factor.
 FACTOR_DIFFERENCE = 1e-4
-# Standard deviations. An angle from its estimate, and the acceleration of this
-# difference, radians a second squared.
+# Standard deviations of an angle from its estimate, and of the acceleration of this
+# difference, in radians and radians a second squared.
 ANGLE_DEVIATION = np.radians(8.0)
 ANGLE_ACCELERATION = np.radians(450.0)
-# The root from its estimate, across the line of sight, metres.
+# Standard deviation of the root from its estimate, across the line of sight, metres.
 CONTOUR_ROOT_DEVIATION = 0.03
-# The turn of a calibrated camera about each axis. Our choice.
+# Standard deviation of the turn of a calibrated camera about each axis. Our choice.
 CAMERA_DEVIATION = np.radians(0.03)
 # The largest change in a step: of the logarithm of a factor, or of a camera's turn.
 MAX_FACTOR_STEP = 0.2
@@ -306,11 +306,15 @@ def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Par
         part.body, turned, poses, places, scale, _changes(part)
     )
     squares = _frame_squares(part, hessians, gradients, angles)
+    # All frames share the factors and turns. So the frames are eliminated first, which
+    # leaves a small system for the shared numbers (the Schur complement).
     solved = squares.steps_for(
         np.concatenate([squares.gradients[..., None], mixed], axis=2)
     )
     steps = solved[..., 0]
     by_factor = solved[..., 1:]
+    # What is known about people weighs as much as `BUILD_FRAMES` frames, however many
+    # frames there are.
     held = max(np.count_nonzero(part.visibility.usable) / BUILD_FRAMES, 1.0)
     values = np.append(part.factors, part.turns)
     known = np.eye(count + part.turns.size) / CAMERA_DEVIATION**2
@@ -320,6 +324,7 @@ def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Par
     changes = np.clip(
         np.linalg.solve(hessian, gradient), -MAX_FACTOR_STEP, MAX_FACTOR_STEP
     )
+    # the factors stay within the range in which builds are searched
     reach = REACH * SPREAD[:count]
     changes[:count] = part.factors - np.clip(
         part.factors - changes[:count], -reach, reach
@@ -354,7 +359,8 @@ def _frame_squares(
 ) -> Squares:
     """Return the squares of a step: the borders, and what is known without them.
 
-    Known are the root and the angles of each frame, and that standing feet do not move.
+    What is known: the root and the angles of each frame, roughly, and that standing
+    feet do not move.
     """
     fitted = part.fitted
     estimate = part.estimate

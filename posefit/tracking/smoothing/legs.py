@@ -119,7 +119,7 @@ def legs_exchanged(
     scene = smoothed.scene
     borders = borders or Borders(scene.observations)
     costs = np.array([frame.cost for frame in smoothed.frames]) * usable
-    # by whether legs are exchanged, 0 or 1
+    # the frames as tracked (0), and with exchanged legs (1)
     tracks = [frames, [_exchanged(scene, frame) for frame in frames]]
     here, there = (scene.motion(track) for track in tracks)
     edges = doubtful(here, there, costs, usable)
@@ -151,7 +151,9 @@ def legs_exchanged(
         same, other = _smoothed_costs(
             window, trials, beta, borders.starting_at(rows.start), threads=threads
         )
-        # what the change from the edge on costs beyond the frames' own costs
+        # The trials differ by the exchanged legs from the edge on, and by the change at
+        # the edge. The first part is already in `added`; the cost of the change
+        # remains.
         later_cost = added[edge : rows.stop].sum()
         if latest:
             later_cost = -later_cost
@@ -213,7 +215,7 @@ def in_doubt(
     typical = np.median(costs[usable])
     excess = np.where(usable & (costs > HIGH_COST * typical), costs - typical, 0.0)
     ends = np.array([0, *edges, len(costs)])
-    # nothing is near the first and the last end, which are those of the film
+    # nothing is near the first and the last end, where the film begins and ends
     first = np.maximum(ends - reach, 0)
     last = ends + reach
     first[-1] = len(costs)
@@ -235,7 +237,8 @@ def in_doubt(
         better[:-apart] |= saves
         better[apart:] |= saves
         apart += 1
-    # of longer stretches only the best end matters, not each pair
+    # For longer stretches it is enough to compare each end with the best one after it,
+    # and with the best one before it.
     least = np.minimum.accumulate(closing[::-1])[::-1]
     better[:-apart] |= least[apart:] < opening[:-apart]
     most = np.maximum.accumulate(opening)

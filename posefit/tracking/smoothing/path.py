@@ -26,9 +26,10 @@ class Squares:
     """Half the Hessian and gradient of a sum of squares, in T frames of n numbers."""
 
     def __init__(self, frames: int, numbers: int) -> None:
-        # a frame with itself, and with the next one
+        # second derivatives within a frame, and between it and the next one
         self.hessians = np.zeros((2, frames, numbers, numbers))
-        # each number with itself two frames later; second differences join no others
+        # the same of a number and itself two frames later; second differences join no
+        # others
         self.two_later = np.zeros((frames, numbers))
         self.gradients = np.zeros((frames, numbers))
 
@@ -180,17 +181,17 @@ def _without_short(flags: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:
     return longer
 
 
-# Standard deviations. The root from its estimate, metres.
+# Standard deviation of the root from its estimate, metres.
 PATH_ROOT_DEVIATION = 0.006
 # The same along the line of sight of a single camera, as a share of the distance.
 DEPTH_DEVIATION = 0.004
 UNUSABLE_DEVIATION = 1.0  # the same in unusable frames, metres
-ROOT_ACCELERATION = 3.0  # the root on each axis, metres a second squared
-# An angle of a leg from its estimate, and the acceleration of this difference, radians
-# a second squared.
+ROOT_ACCELERATION = 3.0  # standard deviation on each axis, metres a second squared
+# Standard deviations of a leg's angle from its estimate, and of the acceleration of
+# this difference, in radians and radians a second squared.
 LEG_DEVIATION = np.radians(3.0)
 LEG_ACCELERATION = np.radians(400.0)
-STANDING_SLIDE = 0.004  # a standing foot in a thirtieth of a second, metres
+STANDING_SLIDE = 0.004  # deviation of a standing foot in 1/30 s, metres
 # Places farther from the estimate than this many standard deviations get less weight.
 OUTLIER_DEVIATIONS = 4.0
 GAUSS_NEWTON_STEPS = 4

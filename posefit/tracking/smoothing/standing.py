@@ -1,4 +1,4 @@
-"""Legs of people who stand before one camera, as straight as the masks allow.
+"""Legs of people who stand in front of one camera, as straight as the masks allow.
 
 A silhouette does not show how far a leg reaches towards the camera, so that the
 tracker bends knees as the people of the library do. They seem to stand with bent knees,
