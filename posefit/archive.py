@@ -22,18 +22,18 @@ from numpy.typing import NDArray
 from posefit.errors import InputError
 from posefit.reading import check_size, cut, quoted
 
-# bytes of an archive's directory, which has about a hundred per array
+# most bytes of an archive's directory, which has about a hundred per array
 DIRECTORY = 100_000
-HEADER = 10_000  # characters of the header that NumPy writes before an array
-# bytes of an array that is stored column by column, and so has to be unpacked whole
+HEADER = 10_000  # most characters of the header that NumPy writes before an array
+# most bytes of an array stored column by column, which has to be unpacked whole
 TURNED = 500_000_000
 KINDS = "biufUS"  # booleans, numbers and text: anything else would be unpickled
-# packed as NumPy does; other ways unpack a thousand times slower
+# NumPy's own ways of packing; others unpack a thousand times slower
 _PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 
 class _RefusedError(InputError):
-    """The file contains something that is not read; the message says what."""
+    """The file contains something that posefit refuses; the message says what."""
 
 
 @dataclass(frozen=True)
@@ -112,8 +112,8 @@ def archived(
         names: The arrays to look for; others are ignored.
         what: Description of the expected arrays, for messages.
         packed: Most bytes that the file may have.
-        single: If the file has only one array, take it for the first of the names,
-            which is needed.
+        single: Whether the first of the names is required; the only array of a file
+            is taken for it, whatever its name.
 
     Raises:
         InputError: The file is damaged or too large, or has several arrays and none of
@@ -196,7 +196,7 @@ def _header(
 
     Args:
         file: The array's file.
-        name: Of the array, for messages.
+        name: The array's name, for messages.
         size: Bytes of the file.
     """
     version = np.lib.format.read_magic(file)
@@ -204,7 +204,7 @@ def _header(
     if version != (1, 0):
         raise _RefusedError(f"{name} in NumPy's format {version}")
     with warnings.catch_warnings():
-        # about headers that Python 2 wrote
+        # NumPy warns about headers that Python 2 wrote
         warnings.simplefilter("ignore")
         shape, fortran, dtype = np.lib.format.read_array_header_1_0(file, HEADER)
     start = file.tell()

@@ -150,7 +150,7 @@ def check_decoded(name: str, size: int) -> None:
     Such masks take time rather than memory if they are unpacked frame by frame.
 
     Args:
-        name: Of the masks, for the message.
+        name: The name of the masks, for the message.
         size: Bytes that they unpack to.
     """
     text = os.environ.get(DECODED, "")

@@ -14,7 +14,7 @@ from typing import Any
 
 from posefit.errors import InputError, printable
 
-# what other libraries call things of posefit
+# names that other libraries use, with the names in posefit
 OTHER_WORDS = {
     "optimizer": ("optimiser", "method"),
     "optimizers": ("optimisers", "methods"),

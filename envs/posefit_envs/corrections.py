@@ -20,9 +20,9 @@ else:
 
 Features = NDArray[np.float32]
 
-# pixels of a picture that a pixel of the small one has, in each direction
+# side, in pixels, of the blocks whose means are the pixels of the small pictures
 BLOCK = 4
-# reach of a correction, in half-ranges of the box; the first proposal reaches all of it
+# largest correction, in half-ranges of the box; the first action spans the whole box
 REACH = 0.3
 # an observation counts at most this many corrections since the best proposal
 MOST_FAILURES = 4
@@ -43,7 +43,7 @@ class Corrections(Wrapper):
 
     Observations have 2 p + d + 2 numbers of -1 to 1:
 
-    | numbers | of what |
+    | numbers | meaning |
     |---|---|
     | p | the observed silhouette, as means of 4 x 4 pixels, 0 to 1 |
     | p | the same, less the silhouette of the best proposal |
@@ -51,8 +51,8 @@ class Corrections(Wrapper):
     | 1 | 1 before the first proposal, else 0 |
     | 1 | corrections since the best proposal, 0 to 4, / 4 |
 
-    Infos and rewards are the environment's, and so are its problems: `best` of each is
-    the best proposal.
+    Infos, rewards and problems are those of the wrapped environment. `best` of each
+    problem is the best proposal of that episode.
 
     Args:
         env: A vector of FitImage-v1, native or not, without other wrappers of
@@ -168,7 +168,7 @@ class Corrections(Wrapper):
 def features(
     observed: Features, drawn: Features, best: Array, first: Flags, failures: Array
 ) -> Features:
-    """Return what an agent sees (n, 2 p + d + 2); see `Corrections`.
+    """Return the observations (n, 2 p + d + 2) of an agent; see `Corrections`.
 
     Args:
         observed: The observed silhouettes (n, p), shrunk.
@@ -187,7 +187,7 @@ def features(
 def shrunk(pictures: Any) -> Features:
     """Return silhouettes (n, height, width, views) as small pictures (n, p).
 
-    A number of them is the mean of 4 x 4 pixels, 0 to 1.
+    Each number is the mean of 4 x 4 pixels, 0 to 1.
     """
     count, height, width, views = pictures.shape
     blocks = pictures.reshape(

@@ -210,8 +210,8 @@ class FitImageVectorEnv(SearchVectorEnv):
         for i, number in zip(rows.tolist(), numbers.tolist(), strict=True):
             self._problems.begin(i, partial(first_problem, self.world, number))
             if self.world.shows_truth:
-                # a scene and its truth are made of one instance, which is not cached
-                # for long
+                # the scene and the truth need the same instance, which does not stay
+                # cached for long
                 first_scene(self.world, number)
                 self._truths[i] = first_truth(self.world, number)
         self.stage.set_scenes(rows, first_scenes(self.world, numbers))

@@ -24,8 +24,8 @@ def trained_policy(name: str = "fit-image") -> Policy:
     """Return a policy that has learned FitImage-v1; it needs NumPy alone.
 
     Args:
-        name: A file of the folder `trained`, where a card of the same name says what
-            the policy has seen, how well it does, and how it was made.
+        name: The name of a file in the folder `trained`. The card of the same name
+            says what the policy was trained on, how well it does, and how it was made.
 
     Returns:
         The policy. It takes observations of `Corrections`, and returns its actions.
@@ -94,7 +94,7 @@ def rollout(
         observations, reward, ended, infos = rows.step(actions[-1])
         rewards.append(reward)
         for i in np.flatnonzero(ended).tolist():
-            # an environment that has begun again only waits for the others
+            # an environment that has begun again only waits for the others: not recorded
             if i in episodes:
                 continue
             own_actions = np.array([step[i] for step in actions])  # (k, d)

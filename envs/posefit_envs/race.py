@@ -42,9 +42,9 @@ SEARCH_FEATURES = 4
 COMMON_FEATURES = 3
 # weight of the latest generation in a slope
 SMOOTHING = 0.2
-# slope observed as 1, in ln(1 + cost) per generation; also a new search's slope
+# the slope that is observed as 1, in ln(1 + cost) per generation; a new search has it
 MAX_SLOPE = 0.1
-# spreads observed as 0 and 1, in half-ranges
+# the spreads that are observed as 0 and 1, in half-ranges
 MIN_SPREAD = 1e-3
 MAX_SPREAD = 1.0
 
@@ -83,7 +83,7 @@ class Races:
         self.budgets = np.zeros(rows, dtype=np.int64)  # generations
         self.left = np.zeros(rows, dtype=np.int64)
         particles = (rows, self.searches, self.population_size)
-        self.bests = np.zeros((*particles, world.dimensions))  # of each particle
+        self.bests = np.zeros((*particles, world.dimensions))  # the best proposal of each particle
         self.best_costs = np.full(particles, np.inf)
         self.costs = np.zeros((rows, self.searches))  # the best of each search
         self.slopes = np.zeros((rows, self.searches))
@@ -113,7 +113,7 @@ class Races:
     def _begin_search(self, row: int, search: int) -> None:
         """Replace one of a race's searches by a new one."""
         space = self.stage.space(row)
-        # a separate generator: what one search draws changes no other
+        # a separate generator, so that the draws of one search do not affect the others
         rng = np.random.default_rng(int(self._rngs[row].integers(2**63)))
         self._optimisers[row][search] = checked(
             lambda: self._factory(space, rng, **self._settings)
@@ -191,7 +191,7 @@ class Races:
     def observations(self) -> NDArray[np.float32]:
         """Return the features (n, 4 searches + 3) of the races."""
         budgets = self.budgets[:, None]
-        # spreads shrink by factors, so that their logarithm is the even scale
+        # a search shrinks by factors, so the scale of spreads is logarithmic
         widths = np.maximum(self.spreads / MIN_SPREAD, 1.0)
         features = [
             log_cost(self.costs),
@@ -329,7 +329,7 @@ class RaceEnv(SearchEnv):
 
     def begin(self, number: int) -> tuple[Any, Infos]:
         """Begin an episode with an instance: return its first observation and infos."""
-        # one number of the environment's generator, however much the race will draw
+        # only one draw from the environment's generator, however many the race will need
         self.races.begin(0, number, int(self.np_random.integers(2**63)))
         self.races.evaluate_first(np.array([0]))
         return self.races.observations()[0], self._infos()

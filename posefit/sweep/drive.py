@@ -29,7 +29,7 @@ class Tally:
     """The state of a sweep, in numbers of cells."""
 
     cells: int
-    done: int = 0  # with a row
+    done: int = 0  # cells with a row
     ran: int = 0  # done by this driver
     failed: int = 0  # attempts of this driver that failed
     quarantined: int = 0
@@ -85,7 +85,7 @@ def drive(
                         ended.append((running.pop(outcome.job.key), outcome))
         waiting += _write(ledger, tally, ended)
     except InputError as error:
-        # the engine may be gone; if it is the ledger, `ended` is empty
+        # if the engine failed, outcomes may remain; if the ledger did, `ended` is empty
         _write(ledger, tally, ended)
         safe = (
             f"{tally.done} of {tally.cells} cells are done and safe: "

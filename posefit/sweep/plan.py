@@ -265,7 +265,7 @@ def _searches(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
     """Return a function that makes the cells of a plan of searches.
 
     A function has no cells in dimensions in which it does not exist. Raises InputError
-    if that leaves a function that the plan names without any.
+    if a function that the plan names exists in none of its dimensions.
     """
     check_names(
         "a plan of a suite", tables, ("suite", *SEARCH_LISTS, "infeasible", "grid")
@@ -273,7 +273,7 @@ def _searches(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
     shared = {name: tables[name] for name in ("suite", "infeasible") if name in tables}
     lists = {}
     for name, (field, default) in SEARCH_LISTS.items():
-        # instances before these may have been used to choose settings
+        # settings may have been chosen on the instances before these
         first = HELD_OUT.start if name == "instances" else 0
         lists[field] = _listed(name, field, tables.get(name, default), first)
     methods = _gridded(

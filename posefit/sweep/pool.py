@@ -50,7 +50,7 @@ class Pool:
         """Start a job in an idle process of its tenant, or in a new one."""
         idle = [worker for worker in self._workers if not worker.is_busy]
         for worker in idle.copy():
-            # it may have been killed meanwhile
+            # an idle process may have been killed meanwhile
             if not worker.is_alive:
                 self._end(worker)
                 idle.remove(worker)

@@ -122,9 +122,10 @@ def _seconds_of(cells: Sequence[Cell], pool: Pool) -> float:
     first = cells[0]
     amount = sum(map(_amount, cells))
     if isinstance(first, TrackCell):
-        # a motion may be shorter
+        # the cell may have fewer frames
         first = replace(first, frames=min(first.frames, FRAMES))
-        _row(first, pool)  # imports and compiles
+        # a first run imports and compiles; the second is timed
+        _row(first, pool)
     row = _row(first, pool)
     searching = row["seconds"]
     if isinstance(first, TrackCell):

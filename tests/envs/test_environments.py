@@ -312,7 +312,7 @@ def test_an_action_outside_is_clipped_with_one_warning(name: str) -> None:
     size = (env.action_space.shape or ())[0]
     with pytest.warns(
         UserWarning,
-        match=r"actions must lie in \[-1, 1\], got 3 from 0: actions are clipped",
+        match=r"actions must lie in \[-1, 1\], got one of size 3: actions are clipped",
     ):
         clipped = env.step(np.full(size, 3.0))
     assert data_equivalence(clipped, other.step(np.ones(size)))
