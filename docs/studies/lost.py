@@ -160,7 +160,7 @@ ALL_CHANGES = {
 }
 CONDITIONS: Mapping[str, Mapping[str, Any]] = {CLEAN: {}, **CHANGES, MASKS: ALL_CHANGES}
 VIEWS: tuple[Views, ...] = (*SIDES, *PAIRS)
-FRAMES = 48  # at most, of a clip
+FRAMES = 48  # most frames of a clip
 ON_THE_SPOT: dict[str, tuple[Clip, ...]] = {
     "gestures": (
         Clip("29_05", FRAMES, 1, "moves their arms"),

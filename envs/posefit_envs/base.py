@@ -51,7 +51,7 @@ def checked_world(env: object, arguments: Mapping[str, Any]) -> World:
     parameters = inspect.signature(type(env)).parameters.values()
     own = [each.name for each in parameters if each.kind is each.KEYWORD_ONLY]
     world = world_of(own, **arguments)
-    # names motions and priors that are unknown
+    # fitted now, so that an unknown motion or prior is reported before the first reset
     checked(lambda: world.learned)
     return world
 
@@ -346,6 +346,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         mask = checked_mask(options.get("reset_mask"), self.num_envs)
         if not mask.all() and (self.numbers < 0).any():
             raise error.ResetNeeded("the first reset must be of all environments")
+        # check everything before any episode begins, so that an error changes nothing
         seeds = _seeds(seed, self.num_envs)
         numbers = self._instances(options.get("instance"))
         for i in np.flatnonzero(mask).tolist():
@@ -430,12 +431,12 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         self.ended = terminated | truncated
         # a row has the infos of its step, unless a reset replaced it (NEXT_STEP) or
         # followed it (SAME_STEP): then it has the infos of the reset
-        going = stepping
+        has_step_infos = stepping
         begun_infos: Infos = self.reset_infos() if not stepping.all() else {}
         final: Infos = {}
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self.ended.any():
             ended = self.ended.copy()
-            going = ~ended
+            has_step_infos = ~ended
             for i in np.flatnonzero(ended).tolist():
                 last_infos = row_of(infos, i)
                 last = {"final_obs": observations[i].copy(), "final_info": last_infos}
@@ -443,7 +444,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
             self.restart(ended)
             observations[ended] = self.observe(np.flatnonzero(ended))
             begun_infos = self.reset_infos()
-        step_infos = masked_infos(going, infos, begun_infos) | final
+        step_infos = masked_infos(has_step_infos, infos, begun_infos) | final
         # Gymnasium's vectors give a reset the reward 0
         rewards = np.where(stepping, rewards, 0.0)
         return observations, rewards, terminated, truncated, step_infos
@@ -493,6 +494,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
             )
         if name in self.row_attributes:
             raise error.Error(f"{name} must be set by the options of reset")
+        # a new attribute, such as a user's label, may differ between environments
         if name in self._own or not hasattr(self, name):
             self._own[name] = tuple(values)
             return
@@ -624,7 +626,9 @@ def _seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | No
         first = checked(whole, "seed", seed, 0)
         return list(range(first, first + count))
     if len(seed) != count:
-        raise ArgumentError(f"seed must be one number or {count} numbers, got {len(seed)}")
+        raise ArgumentError(
+            f"seed must be one number or {count} numbers, got {len(seed)}"
+        )
     seeds: list[int | None] = []
     for each in seed:
         # None leaves the environment's generator as it is

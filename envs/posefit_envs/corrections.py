@@ -84,6 +84,7 @@ class Corrections(Wrapper):
                 f"sizes must be divisible by {BLOCK}, got pictures of shape {pictures}"
             )
         mode = AutoresetMode(env.metadata["autoreset_mode"])
+        # that mode hides the last proposal's picture behind the next episode's first
         if mode is AutoresetMode.SAME_STEP:
             raise error.Error("autoreset_mode must be NextStep or Disabled")
         count = env.num_envs
@@ -130,6 +131,7 @@ class Corrections(Wrapper):
         """
         proposals = self.proposals(np.asarray(actions, dtype=np.float64))
         pictures, rewards, terminated, truncated, infos = self.env.step(proposals)
+        # under NEXT_STEP an ended row begins an episode, and its proposal is not used
         begun = np.asarray(infos["evaluations"]) == 0
         better = (infos["cost"] < self._best_costs) & ~begun
         self._best[better] = proposals[better]

@@ -94,7 +94,7 @@ def rollout(
         observations, reward, ended, infos = rows.step(actions[-1])
         rewards.append(reward)
         for i in np.flatnonzero(ended).tolist():
-            # an environment that has begun again only waits for the others: not recorded
+            # an environment that has begun again only waits for the others
             if i in episodes:
                 continue
             own_actions = np.array([step[i] for step in actions])  # (k, d)

@@ -71,6 +71,7 @@ class Races:
         self._factory = checked(registry().optimiser, optimiser)
         sizes = {"population_size": self.population_size}
         names = [setting.name for setting in settings_of(self._factory)]
+        # one more generation than the largest budget: the first population is free
         self._settings = planned(
             self._factory,
             sizes if "population_size" in names else {},
@@ -83,7 +84,8 @@ class Races:
         self.budgets = np.zeros(rows, dtype=np.int64)  # generations
         self.left = np.zeros(rows, dtype=np.int64)
         particles = (rows, self.searches, self.population_size)
-        self.bests = np.zeros((*particles, world.dimensions))  # the best proposal of each particle
+        # the best proposal of each particle, and its cost
+        self.bests = np.zeros((*particles, world.dimensions))
         self.best_costs = np.full(particles, np.inf)
         self.costs = np.zeros((rows, self.searches))  # the best of each search
         self.slopes = np.zeros((rows, self.searches))
@@ -148,6 +150,7 @@ class Races:
         """Run one generation of the chosen search (m,) of some races (m,)."""
         pairs = list(zip(rows.tolist(), chosen.tolist(), strict=True))
         count = self.population_size
+        # the stage takes a population for every race; those left out remain 0
         proposals = np.zeros((len(self.problems), count, self.world.dimensions))
         for row, search in pairs:
             population = self._optimisers[row][search].ask()
@@ -159,6 +162,7 @@ class Races:
             proposals[row] = population
         costs = self.stage.costs(proposals, rows)
         self.problems.count(rows, proposals[rows], costs[rows])
+        # copies, because an optimiser may keep or change what it is told
         for row, search in pairs:
             costs_of_search = costs[row].copy()
             self._optimisers[row][search].tell(proposals[row].copy(), costs_of_search)
@@ -179,6 +183,7 @@ class Races:
         bests[better] = proposals[better]
         best_costs[better] = costs[better]
         after = best_costs.min(axis=1)
+        # a search without an earlier cost has no fall yet, and keeps the first slope
         falls = log_improvement(np.where(searched, before, after), after)
         slopes = self.slopes[at] + SMOOTHING * (falls - self.slopes[at])
         self.bests[at] = bests

@@ -85,6 +85,7 @@ class VectorRows:
         waiting = np.ones(self.count, dtype=bool) if mask is None else mask.copy()
         infos: list[Infos] = [{} for _ in range(self.count)]
         observations = None
+        # a reset has one set of options, so rows with equal options are reset together
         while waiting.any():
             first = options[int(np.flatnonzero(waiting)[0])]
             alike = waiting & np.array([one == first for one in options])

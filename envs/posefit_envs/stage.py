@@ -350,6 +350,7 @@ class Stage:
             latents,
         )
         assert finite, "actions are checked, and spaces are finite"
+        # one call for the latents of all scenes, which is faster than one for each
         angles = self._prior.inverse_transform(latents.reshape(n * k, -1))
         poses[..., 3:] = angles.reshape(n, k, -1)
         if self._translation == "aligned":

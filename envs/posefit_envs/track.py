@@ -279,7 +279,7 @@ class TrackVectorEnv(SearchVectorEnv):
         self._costs = drawn.costs
         rewards = reward_of_cost(drawn.costs)
         infos = proposal_infos(self.stage, drawn, self.world.shows_truth)
-        # count before poses are committed: the counts belong to the frames of the proposals
+        # count before poses are committed: the counts belong to the proposals' frames
         self._count(infos)
         full = stepping & (problems.evaluations >= self.evaluations_per_frame)
         terminated, committed = self._commit(np.flatnonzero(full), drawn.pictures)

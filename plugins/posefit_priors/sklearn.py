@@ -28,7 +28,7 @@ VARIANTS = (
     "MiniBatchDictionaryLearning", "MiniBatchSparsePCA", "PCA", "SparsePCA",
     "TruncatedSVD",
 )  # fmt: skip
-# largest number of poses for KernelPCA, which needs the square of it in memory
+# largest number of poses for KernelPCA, whose memory grows with its square
 KERNEL_POSES = 5_000
 DEFAULTS: dict[str, dict[str, Any]] = {
     "KernelPCA": {"kernel": "rbf", "gamma": 0.2, "fit_inverse_transform": True}
@@ -38,8 +38,8 @@ DEFAULTS: dict[str, dict[str, Any]] = {
 class Transformed:
     """The space of a scikit-learn transformer, with constraints 1 and 2 on its latents.
 
-    A linear transformer is inverted by our own loop. Any other is inverted row by row,
-    about 100 us each, because a row must always give the same bits.
+    A linear transformer is inverted by posefit's own loop. Any other is inverted row by
+    row, about 100 us each, because a row must always give the same bits.
 
     Settings:
         variant: The class, such as KernelPCA; `sklearn:NAME` sets it.

@@ -104,7 +104,7 @@ def read_amc(
     if first > 1:
         from_0 = "here its frames are numbered from 0"
         notes = (*notes, f"{path}: the file's first frame is number {first}: {from_0}")
-    # of the joints, because a root may make many turns
+    # only joints are doubted, because a root may make many turns
     if said := doubtful_angles(values[:, 6:], radians=radians):
         notes = (*notes, f"{path}: {said}")
     angles = values if radians else np.deg2rad(values)

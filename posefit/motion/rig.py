@@ -74,8 +74,8 @@ class Rig:
     """A tree with a person's joints, at rest and in motion.
 
     Attributes:
-        names: Of the nodes, "" for the end of a bone without a further joint.
-        parents: Of the nodes, -1 for a root.
+        names: Names of the nodes, "" for the end of a bone without a further joint.
+        parents: Parents of the nodes, -1 for a root.
         joints: Which nodes are the person's joints.
         rest: Turns (nodes, 3, 3) and places (nodes, 3) at rest.
         moving: Turns (nodes, T, 3, 3) and places (nodes, T, 3) in the frames.
@@ -144,7 +144,7 @@ class Retargeted:
     """A rig's motion, converted to a `Skeleton`, in the rig's unit.
 
     Attributes:
-        skeleton: With the rig's bones.
+        skeleton: A skeleton with the rig's bones.
         poses: Angles (T, 66).
         places: Root joint (T, 3).
         filled: Names of the bones that the rig does not have.
@@ -189,8 +189,8 @@ class _Rest(NamedTuple):
 
     Attributes:
         own: Whether it is the rig's own rest pose.
-        turns: Of the nodes (nodes, 3, 3).
-        places: Of the nodes (nodes, 3).
+        turns: Turns of the nodes (nodes, 3, 3).
+        places: Places of the nodes (nodes, 3).
         root: Left, up and ahead as columns (3, 3), in the root's node.
     """
 
@@ -347,10 +347,10 @@ def _aim(
     """Turn a carrier (T, 3, 3) so that a bone reaches its end; return its length.
 
     Args:
-        carrier: Turned in place.
-        direction: Of the bone in the carrier (3,).
-        length: Of the bone.
-        reach: From the bone's start to its wanted end (T, 3).
+        carrier: Turns of the carrier; changed in place.
+        direction: Direction of the bone in the carrier (3,).
+        length: Length of the bone.
+        reach: Vectors from the bone's start to its wanted end (T, 3).
         near: Distance below which nothing is changed.
     """
     distances = np.linalg.norm(reach, axis=1)

@@ -16,7 +16,7 @@ from posefit.statistics.means import Intervals
 from posefit.statistics.profiles import Trace, performance_profile
 from posefit.uncertainty.calibration import LEVELS
 
-POINTS = 41  # of a curve
+POINTS = 41  # points of a curve
 PROFILE_POINTS = 200  # points of a performance profile
 # the levels of intervals in percent, as they are named in rows
 LEVEL_NAMES = tuple(f"{100 * level:.0f}" for level in LEVELS)
@@ -27,8 +27,8 @@ class Line:
     """A method's line: points from left to right, with an interval of each.
 
     Attributes:
-        x: Of each point (n,), rising.
-        y: Of each point (n,).
+        x: The x of each point (n,), in ascending order.
+        y: The y of each point (n,).
         low: The lower ends of the intervals (n,), nan if unknown; None without
             intervals.
         high: The upper ends (n,).
@@ -118,7 +118,7 @@ def convergence(contest: Contest, evaluations: Array) -> list[Line | None]:
 
     Args:
         contest: The methods and the runs that they share.
-        evaluations: The numbers of evaluations (n,), rising.
+        evaluations: The numbers of evaluations (n,), in ascending order.
 
     Returns:
         For each method a line with intervals, or None if one of its runs has no trace.

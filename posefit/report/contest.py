@@ -28,8 +28,8 @@ from posefit.statistics.pairing import Shared, most_shared
 MIN_LOST = 3
 
 InstanceFields = Mapping[str, Any]  # the fields of a plan that define an instance
-Row = Mapping[str, Any]  # of a ledger
-Indices = Array | NDArray[np.int64]  # of rows
+Row = Mapping[str, Any]  # a row of a ledger
+Indices = Array | NDArray[np.int64]  # indices of rows
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class Kind(Protocol):
         ...
 
     def figures(self, runs: "Runs", rows: Indices) -> dict[str, float | None]:
-        """Return each figure of some rows, given by their indices, together."""
+        """Return the average of each figure over some rows, given by their indices."""
         ...
 
     def interval(self, contest: "Contest", place: int) -> tuple[float, float]:
@@ -161,7 +161,7 @@ class Runs:
         method: The index (n,) of each row's method.
         instance: The index (n,) of each row's instance.
         seed: The index (n,) of each row's seed.
-        seeds: The seeds, rising.
+        seeds: The seeds, in ascending order.
         keys: The first eight characters of each row's key (n,).
         figures: Each figure (n,) by name, nan if a row does not have it.
         data: The other data of each row, by the names of `Kind.data`.
@@ -233,7 +233,7 @@ class Runs:
         return int((self.figures["lost_rate"][rows] > 0.0).sum())
 
     def values(self, field: str) -> list[Any]:
-        """Return the distinct values of a field of methods or instances, rising."""
+        """Return the distinct values of a field of methods or instances, sorted."""
         definitions = (*self.variants, *self.instance_fields)
         return sorted({fields[field] for fields in definitions if field in fields})
 
@@ -281,7 +281,7 @@ class Contest(Shared):
 
     @cached_property
     def instances(self) -> tuple[int, ...]:
-        """The indices of the shared instances, rising."""
+        """The indices of the shared instances, in ascending order."""
         return tuple(np.unique(self.instance).tolist())
 
     def instance_field(self, name: str) -> Array:

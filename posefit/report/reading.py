@@ -73,7 +73,7 @@ class _Rows:
         self.kind = kind
         self.methods = _Distinct()  # the fields that define each method
         self.instances = _Distinct()  # the fields that define each instance
-        self.seeds: dict[int, int] = {}  # in their order, of any size
+        self.seeds: dict[int, int] = {}  # each seed, of any size, with its number
         # each quarantined cell with the number of its method
         self.quarantined: list[tuple[int, Row]] = []
         # of each finished row: the numbers of its method, instance and seed

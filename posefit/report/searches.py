@@ -21,7 +21,7 @@ from posefit.suites.problem import TARGETS
 from posefit.suites.running import ALL, SHOWN, SuiteRun, suite_scores
 
 RANDOM = "random"  # the baseline method
-POINTS = 61  # of a curve
+POINTS = 61  # points of a curve
 
 
 def search_run(row: Mapping[str, Any]) -> SuiteRun:
@@ -94,7 +94,7 @@ class Searches:
     )
 
     def computed(self, row: Row, /) -> dict[str, float]:
-        """Return the share of targets that a row reached, and its cost above."""
+        """Return a row's share of reached targets, and its cost above the truth."""
         run = search_run(row)
         return _figures(run, _hits(run))
 

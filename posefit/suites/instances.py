@@ -275,7 +275,7 @@ def _next_frame(draft: _Draft) -> SuiteInstance:
 
 
 def _noisy(draft: _Draft) -> SuiteInstance:
-    """Return an instance whose silhouette has another damage at each evaluation."""
+    """Return an instance with a differently damaged silhouette at each evaluation."""
     made = _single(draft)
     rng = draft.rng
     mask = made.frames[0].silhouettes[0].mask

@@ -36,7 +36,7 @@ class Result:
     name: str
     outcome: Literal["passed", "failed", "skipped"]
     detail: str = ""
-    traceback: str = ""  # of the plugin's error, from its first own frame
+    traceback: str = ""  # of the plugin's error, from the plugin's first frame
 
 
 @dataclass(frozen=True)
