@@ -143,7 +143,7 @@ def compare(
         1
     """
     factories: dict[str, tuple[Callable[..., Any], str]] = {}
-    # a random word, so that keys differ from those of earlier calls with these factories
+    # random, so that keys differ from those of earlier calls with these factories
     call = token_hex(4)
     entries = [_named(entry, call, factories) for entry in methods]
     register(factories)

@@ -222,8 +222,8 @@ class Registry:
     def hint(self, name: str, known: Iterable[str]) -> str:
         """Return the end of a message about an unknown name.
 
-        It names the other kind that has this name, or else the nearest known name or the
-        command that lists the known names.
+        It names the other kind that has this name, or else the nearest known name or
+        the command that lists the known names.
         """
         kinds = [kind for kind, offers in self.offers.items() if name in offers]
         if kinds:

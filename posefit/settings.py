@@ -76,7 +76,8 @@ def settings_in(text: str) -> dict[str, tuple[str, str]]:
 
     Such a list is a line `Settings:`, then an indented line `name (symbol): meaning`
     for each setting, which may continue in lines with more indentation. The symbol is
-    the letter in the publication, and is "" if it is missing. Without a list the result is empty.
+    the letter in the publication, and is "" if it is missing. Without a list the result
+    is empty.
     """
     listed = _LIST.search(text)
     if not listed:

@@ -172,7 +172,7 @@ class Situation(NamedTuple):
 
     views: Views
     every: int  # of this many tracks, one has the conditions
-    fields: Mapping[str, Any]  # of the cell
+    fields: Mapping[str, Any]  # fields of the cell
     frames: int = FRAMES  # most frames of a clip
 
 
@@ -189,7 +189,7 @@ class Run(NamedTuple):
 
     change: str
     situation: str
-    number: int  # of the clip, and the seed
+    number: int  # the number of the clip, and the seed
 
 
 def constants() -> dict[str, Change]:

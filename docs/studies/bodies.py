@@ -228,7 +228,7 @@ class Shot(NamedTuple):
     views: int
     body: int
     landmarks: bool = False
-    seed: int = 0  # of the track
+    seed: int = 0  # seed of the track
     legs: bool = False  # whether the legs have published shapes
 
     @property

@@ -39,7 +39,7 @@ from table import WORKERS, bar, markdown
 
 METHODS = ("cma", "scipy", "pso", "sapso", "annealed")  # scipy: differential evolution
 BUDGETS = (10, 100, 1000, 10_000)  # evaluations for each dimension
-INSTANCES = 8  # of each function
+INSTANCES = 8  # instances of each function
 BBOB = (1, 2, 3, 6, 8, 10, 13, 15, 16, 17, 21, 24)
 # random points; descents, and their evaluations for each dimension
 POINTS = 1000
@@ -61,7 +61,7 @@ ACROSS = 3
 Cost = Callable[[Array], Array]
 Row = Mapping[str, float]  # a function's features
 Key = tuple[int, int]  # function, dimension
-Shares = dict[str, list[float]]  # of targets, or costs, by method, after each budget
+Shares = dict[str, list[float]]  # shares or costs by method, after each budget
 COMPARED = (
     "conditioning",
     "elsewhere",

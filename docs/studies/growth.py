@@ -59,7 +59,7 @@ FLAT = 0.05  # what grows by less than this share is flat
 # a report compares this many methods
 METHODS = 10
 POSES = 400
-PORT = 8786  # of a Dask scheduler
+PORT = 8786  # port of a Dask scheduler
 WIDTHS = (80, 160, 320, 640, 1280)
 VIEWS = (1, 2, 4, 8)
 COMPONENTS = (3, 6, 12, 24, 48)

@@ -378,7 +378,7 @@ def _logistic(
     return {"weights": named, "bias": round(bias, DIGITS)}
 
 
-RECALL = 0.95  # of lost frames, for which false alarms are counted
+RECALL = 0.95  # recall of lost frames at which false alarms are counted
 
 
 def row_of(cell: TrackCell, track: Case) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from posefit_envs.corrections import REACH, features, shrunk
 CORRECTIONS = 2  # per silhouette
 SILHOUETTES = 6  # for each instance, before others are drawn
 POOLS = {1: 2048, 9: 6144}  # training instances, by the number of motions
-SPREAD = 0.3  # of the answers around true poses, in half-ranges of the box
+SPREAD = 0.3  # spread of answers around true poses, in half-ranges of the box
 TILTS = 0.5  # pitch and roll are drawn from a narrower spread
 NOISE = 0.1  # largest deviation of a proposal in training
 LEARNING_RATE = 1e-3

@@ -31,7 +31,7 @@ from posefit.cli.output import Command
 from table import markdown
 
 SAMPLE_SECONDS = 5.0
-START_SHARE = 0.01  # of the time, in which caches fill
+START_SHARE = 0.01  # share of the time in which caches fill
 TENTH = 0.1
 LIVE_FPS = 4.0
 LIVE_SIZE = (160, 120)

@@ -34,7 +34,7 @@ from posefit_reproduce.jobs import each
 Row = Mapping[str, Any]
 K = TypeVar("K", bound=Hashable)
 SHARES = ("lost_rate", "swap_rate")
-RESAMPLES = 2000  # of a bootstrap
+RESAMPLES = 2000  # resamples of a bootstrap
 WORKERS = click.option(
     "--workers",
     type=click.IntRange(1),

@@ -136,7 +136,7 @@ class FitImageEnv(SearchEnv):
         self.max_evaluations = checked(whole, "max_evaluations", max_evaluations, 1)
         self.action_space, self.observation_space = image_spaces(self.world)
         self.stage = Stage(self.world, 1)
-        self._cost = np.nan  # of the last proposal
+        self._cost = np.nan  # the last proposal's
 
     def begin(self, number: int) -> tuple[Image, Infos]:
         """Begin an episode with an instance: return its first observation and infos."""
@@ -201,7 +201,7 @@ class FitImageVectorEnv(SearchVectorEnv):
         self.set_spaces(*image_spaces(self.world))
         self.stage = Stage(self.world, num_envs, self.threads)
         self._problems = Problems(num_envs, self.world.dimensions)
-        self._costs = np.full(num_envs, np.nan)  # of the last proposals
+        self._costs = np.full(num_envs, np.nan)  # the last proposals'
         self._truths = np.zeros((num_envs, self.world.dimensions))
 
     def begin(self, rows: Rows) -> None:

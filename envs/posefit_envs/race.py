@@ -334,7 +334,7 @@ class RaceEnv(SearchEnv):
 
     def begin(self, number: int) -> tuple[Any, Infos]:
         """Begin an episode with an instance: return its first observation and infos."""
-        # only one draw from the environment's generator, however many the race will need
+        # only one draw from the environment's generator, however many a race needs
         self.races.begin(0, number, int(self.np_random.integers(2**63)))
         self.races.evaluate_first(np.array([0]))
         return self.races.observations()[0], self._infos()

@@ -126,7 +126,7 @@ class TrackEnv(SearchEnv):
         )
         self.action_space, self.observation_space = image_spaces(self.world)
         self.stage = Stage(self.world, 1)
-        self._cost = np.nan  # of the last proposal
+        self._cost = np.nan  # the last proposal's
 
     def begin(self, number: int) -> tuple[Image, Infos]:
         """Begin an episode with an instance: return its first observation and infos."""
@@ -156,7 +156,7 @@ class TrackEnv(SearchEnv):
         observation = drawn.pictures[0]
         reward = float(reward_of_cost(self._cost))
         infos = row_of(proposal_infos(self.stage, drawn, self.world.shows_truth), 0)
-        # count before a pose is committed: the counts belong to the frame of the proposal
+        # count before a pose is committed: the counts belong to the proposal's frame
         self._count(infos)
         committed = nothing_committed(self.world)
         if not problem.remaining_evaluations:
@@ -241,7 +241,7 @@ class TrackVectorEnv(SearchVectorEnv):
         self.stage = Stage(self.world, num_envs, self.threads)
         self._problems = Problems(num_envs, self.world.dimensions)
         self._sequences: dict[int, Sequence] = {}
-        self._costs = np.full(num_envs, np.nan)  # of the last proposals
+        self._costs = np.full(num_envs, np.nan)  # the last proposals'
 
     def begin(self, rows: Rows) -> None:
         """Begin episodes in some environments, with the instances of `numbers`."""

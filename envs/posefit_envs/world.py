@@ -198,7 +198,7 @@ def world_of(own: Sequence[str] = (), /, **arguments: Any) -> World:
     for name in arguments:
         if name not in known:
             every = *known, *own
-            # Python's own wording, from which TorchRL recognises the argument to leave out
+            # Python's wording, in which TorchRL recognises an argument to leave out
             raise TypeError(
                 f"unexpected keyword argument {quoted(name)}"
                 f"{suggestion(name, every)}: it must be one of {', '.join(every)}"

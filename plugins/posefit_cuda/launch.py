@@ -19,7 +19,7 @@ from posefit.silhouette.rasteriser import FAR, FLAT, HUGE, NEAR, ONE, WINDOW, ZE
 from posefit.silhouette.spans import BLOCK
 from posefit.silhouette.spans import STRIP_PIXELS as STRIP
 
-THREADS = 64  # of a block
+THREADS = 64  # threads of a block
 WORDS = 4  # words of a row that a thread fills together
 _ANGLES = ANGLES
 _BONES = len(BONES)

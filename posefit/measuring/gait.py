@@ -23,9 +23,9 @@ from posefit.measuring.segments import SIDES
 from posefit.motion.motion import Motion, at_frames
 from posefit.motion.steadiness import runs
 
-STEP_SECONDS = (0.33, 1.3)  # of a walk: 46 to 180 steps per minute
+STEP_SECONDS = (0.33, 1.3)  # a step of a walk: 46 to 180 steps per minute
 MIN_SPEED = 0.2  # metres per second
-MIN_STEPS = 2  # of a walk
+MIN_STEPS = 2  # fewest steps of a walk
 MIN_STEPS_SHARE = 1.0 / 3.0  # least share of the known time that the steps last
 # metres between the lines on which the feet of a walk strike; in dancing or dodging it
 # is wider

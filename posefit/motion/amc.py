@@ -29,7 +29,7 @@ from posefit.motion.motion import LONGEST, Motion
 from posefit.reading import check_size, quoted
 
 FPS = 120.0  # CMU's rate; its files do not state it
-RATE = re.compile(r"#\s*(\S{1,40}) frames a second")  # in posefit's own files
+RATE = re.compile(r"#\s*(\S{1,40}) frames a second")  # posefit writes it
 SIZE_LIMIT = 500_000_000  # bytes
 LONGEST_LINE = 10_000  # bytes; the root's line has about 60
 LEAST = 0.5  # a file whose angles are all smaller than this is of a rest pose

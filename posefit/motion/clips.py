@@ -20,7 +20,7 @@ from posefit.motion.bvh import read_bvh
 from posefit.motion.motion import Motion
 from posefit.reading import existing, quoted
 
-FPS = 30.0  # of motions and masks that state no rate
+FPS = 30.0  # rate of motions and masks that state none
 MOTIONS = (".amc", ".bvh")
 # memory for each pose that a method learns from: angles, joints, codes, and copies
 POSE_BYTES = 3_000

@@ -53,7 +53,7 @@ class Traces:
     def __init__(self) -> None:
         self._distinct: list[Array] = []  # evaluations, each once
         self._places: dict[bytes, int] = {}  # their places in the list
-        self._used = array("q")  # of each trace, the place of its evaluations
+        self._used = array("q")  # the place of each trace's evaluations
         self._costs = Packed()
 
     def append(self, trace: Trace) -> None:

@@ -1,7 +1,7 @@
 """Shares: of targets reached within some evaluations, of runs within an error.
 
-An anytime trace consists of increasing evaluations (k,) and the best cost so far (k,) at
-each, which never rises.
+An anytime trace consists of increasing evaluations (k,) and the best cost so far (k,)
+at each, which never rises.
 """
 
 import numpy as np

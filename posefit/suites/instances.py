@@ -55,7 +55,7 @@ POOL = 32  # damaged silhouettes of a noisy instance
 # The order of the damaged silhouettes, which repeats. Its length is a prime.
 ORDER = generator("suite").integers(POOL, size=10_007)
 ANCHOR_OFF = 0.3  # metres; the largest error of an alignment's anchor along each axis
-DIGITS = 4  # of a true proposal, so that it is the same on every machine
+DIGITS = 4  # digits of a true proposal, which is then the same on every machine
 
 
 @dataclass(frozen=True, eq=False)

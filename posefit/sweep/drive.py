@@ -33,7 +33,7 @@ class Tally:
     ran: int = 0  # done by this driver
     failed: int = 0  # attempts of this driver that failed
     quarantined: int = 0
-    stopped: bool = False  # by the user
+    stopped: bool = False  # whether the user stopped the sweep
 
 
 def drive(

@@ -162,7 +162,7 @@ class Ledger:
 
         A cell counts once, and as finished if it is finished in any of the files.
         """
-        # keys are unique within a file, so one file needs no set of perhaps a million keys
+        # keys are unique within a file, so one file needs no set of up to a million
         several = len(self._files) > 1
         counted = set[str]()
         if several and status != "done":

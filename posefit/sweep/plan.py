@@ -55,8 +55,8 @@ PARTS = {"optimisers": "optimiser", "priors": "prior"}  # the parts of a method
 TABLES = ("defaults", "product", "grid", "cells")
 DEFAULT = "default"  # the name of the plan that comes with posefit
 INPUT = "-"  # the name of a plan that is read from standard input
-MAX_CELLS = 1_000_000  # of a product
-MAX_BYTES = 1_000_000  # of a plan's text
+MAX_CELLS = 1_000_000  # most cells of a product
+MAX_BYTES = 1_000_000  # most bytes of a plan's text
 # what a grid contains, for messages
 GRID = 'settings and their values such as "sapso.inertia" = [0.7, 0.9]'
 

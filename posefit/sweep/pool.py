@@ -40,7 +40,7 @@ class Pool:
         self._count = workers
         self._limits = limits
         self._task = cloudpickle.dumps((run, prepare))
-        self._workers: list[Worker] = []  # by the time of their last use
+        self._workers: list[Worker] = []  # sorted by the time of their last use
 
     def window(self) -> int:
         """Return how many jobs may run at a time."""

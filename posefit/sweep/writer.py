@@ -23,7 +23,7 @@ from posefit.sweep.schema import FORMAT, MIGRATIONS, SUFFIX, VERSIONS, WAL, form
 ATTEMPTS = 3
 LOSSES = 50
 BUSY_SECONDS = 60.0  # the longest wait for a program that locks the file in a sweep
-PAGE_BYTES = 8192  # of a new file; a page then contains about three rows
+PAGE_BYTES = 8192  # page size of a new file; a page contains about three rows
 NAMES = ("key", "spec", "status")  # the parts of a row that are not figures
 
 

@@ -25,7 +25,7 @@ EVALUATIONS = 400  # budget of a search unless a check needs a special one
 # budget of a search that is as long as a frame's, and its most populations
 LONG = 2_440
 LONG_ASKS = 100
-BUDGET = 800  # of the searches that have to beat chance
+BUDGET = 800  # budget of the searches that have to beat chance
 SEEDS = range(5)
 MAX_SHARE_OF_CHANCE = 0.95  # a cost beats chance if it is below this share of chance's
 # for the search in a corner of a nine-dimensional box, with the budget that the SAPSO

@@ -25,7 +25,7 @@ from posefit.testing.problem import walking_angles
 from posefit.testing.results import BrokenError, expect
 
 ROWS = 100
-MAX_SECONDS = 5e-3  # to recover a pose
+MAX_SECONDS = 5e-3  # longest time to recover a pose
 # share of copies in a first population above which a warning is given
 MAX_COPIES = 0.1
 
