@@ -221,7 +221,7 @@ def _plain(hint: Any) -> Any:
 
 
 def choices_of(hint: Any) -> tuple[Any, ...]:
-    """Return the choices of a `Literal`, or of a union of such and None; else ()."""
+    """Return the choices of a `Literal`, or of a union of these and None; else ()."""
     hint = _plain(hint)
     if get_origin(hint) is Literal:
         return get_args(hint)

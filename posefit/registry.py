@@ -51,8 +51,8 @@ class Offer:
     """One registered name.
 
     Attributes:
-        kind: Kind of plugin.
-        name: The name.
+        kind: The kind of plugin.
+        name: The name that users give.
         factory: Takes the arguments of its kind, and keyword-only settings.
         distribution: The installed package that registered it.
         version: The version of the distribution.

@@ -262,7 +262,7 @@ def _known(plugin: str, name: str, known: Mapping[str, Setting]) -> Setting:
         if known:
             listed = f"one of {', '.join(known)}"
         else:
-            listed = "none, it takes none"
+            listed = "left out, because it takes none"
         near = suggestion(name, known)
         raise InputError(
             f"a setting of {plugin} must be {listed}, got {quoted(name)}{near}"

@@ -64,7 +64,7 @@ POSING = "pose network"
 DRAWN = {CLONING: 0.0, POSING: 0.7}  # share of drawn silhouettes
 TAUGHT_STEPS = 240_000
 TEACHERS = 256  # environments
-# PPO, and PPO that goes on from a pose network
+# PPO, and PPO that continues from a pose network
 CONTINUED = "pose network, then PPO"
 LEARNERS = (CLONING, "PPO", POSING, CONTINUED)
 ENVIRONMENTS = 64

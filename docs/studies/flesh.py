@@ -113,8 +113,8 @@ def painted(body: Body, legs: Legs, camera: Camera, pose: Array, place: Array) -
         body: The body, whose other bones are cones.
         legs: The discs of its thighs and shanks.
         camera: The camera.
-        pose: (66,).
-        place: (3,) metres, of the root.
+        pose: The pose (66,).
+        place: The position (3,) of the root, in metres.
     """
     skeleton = body.skeleton
     joints = skeleton.joints(pose[None], place[None])[0]

@@ -494,7 +494,7 @@ def lost_lines(
 @WORKERS
 def main(rows: str | None, store: str | None, workers: int | None) -> None:
     with new_file(store) if store else nullcontext() as stored:
-        # all cells are made, and thereby checked, before any runs
+        # all cells are made, and so checked, before any of them runs
         cells = [(track, cell_of(track.spec)) for track in cases()]
         jobs = {
             (track.group, track.clip.name, *track[2:]): partial(row_of, cell, track)

@@ -40,8 +40,8 @@ def teach(network: Any, env: Any, seed: int, steps: int, drawn: float) -> None:
         network: A module of torch, from the observations of
             `posefit_envs.Corrections` to actions.
         env: The vector, without wrappers.
-        seed: Of the silhouettes.
-        steps: Steps of the environment.
+        seed: Seed of the silhouettes.
+        steps: Number of steps of the environment.
         drawn: Share of silhouettes that are drawn near a person's pose. The others are
             the instances' silhouettes, and the answers their `truth`.
     """
@@ -99,7 +99,7 @@ class Instances:
         return shrunk(self.env.step(proposals)[0][..., 1::2])
 
     def boxed(self, proposals: Array) -> Array:
-        """Return proposals within the box; an unknown yaw goes round."""
+        """Return proposals within the box; an unknown yaw wraps around."""
         proposals = proposals.copy()
         if self.turns:
             proposals[:, 0] = (proposals[:, 0] + 1.0) % 2.0 - 1.0

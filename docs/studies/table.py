@@ -78,7 +78,7 @@ def earlier(path: str | None, key: Callable[[Row], K]) -> dict[K, Row]:
 def kept(
     path: str | None, ended: Iterator[tuple[K, Row]], count: int
 ) -> Iterator[tuple[K, Row]]:
-    """Yield rows under their keys as they come, and write each to the file, if any."""
+    """Yield finished rows under their keys, and write each to the file, if any."""
     for key, row in bar(ended, count):
         if path is not None:
             with Path(path).open("a", encoding="utf-8") as file:

@@ -95,7 +95,7 @@ class Corrections(Wrapper):
         )
         self.observation_space = batch_space(self.single_observation_space, count)
         worlds = env.unwrapped.get_attr("world")  # type: ignore[attr-defined]
-        self._goes_round = worlds[0].yaw == "unknown"
+        self._yaw_wraps = worlds[0].yaw == "unknown"
         self._observed = np.zeros((count, pixels), dtype=np.float32)
         self._best = np.zeros((count, dimensions))
         self._best_drawn = np.zeros((count, pixels), dtype=np.float32)
@@ -147,7 +147,7 @@ class Corrections(Wrapper):
         first = np.isinf(self._best_costs)
         reach = np.where(first, 1.0, REACH * 0.5**self._failures)
         proposals = self._best + reach[:, None] * np.clip(actions, -1.0, 1.0)
-        if self._goes_round:
+        if self._yaw_wraps:
             proposals[:, 0] = (proposals[:, 0] + 1.0) % 2.0 - 1.0
         clipped: Array = np.clip(proposals, -1.0, 1.0)
         return clipped

@@ -58,7 +58,7 @@ class FitImageSteps:
     def step(self, proposals: Array) -> Array:
         """Return the costs (n,) of proposals (n, d), one in each environment."""
         _, _, ended, infos = self._rows.step(proposals)
-        # a search goes on over many episodes, always with the same instance
+        # a search continues over many episodes, always with the same instance
         if ended.any():
             options = [{"instance": number} for number in self._numbers]
             self._rows.reset(None, options, ended)

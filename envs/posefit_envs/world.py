@@ -274,7 +274,7 @@ def _motions(motion: Any, held_out_people: bool) -> tuple[str, ...]:
         names = motion
     if not isinstance(names, Sequence) or not names or not _are_texts(names):
         raise ArgumentError(
-            f"motion must be a name, several, or 'all', got {quoted(motion)}"
+            f"motion must be a name, several names, or 'all', got {quoted(motion)}"
         )
     if held_out_people:
         for name in names:
@@ -302,7 +302,7 @@ def _views(view_degrees: Any) -> tuple[float, ...]:
         views = []
     if not views:
         raise ArgumentError(
-            "view_degrees must be a finite number or several, "
+            "view_degrees must be one finite number or several, "
             f"got {quoted(view_degrees)}"
         )
     return tuple(views)

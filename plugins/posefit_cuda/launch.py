@@ -363,16 +363,16 @@ def count_on_device(chain, radii, view, size, observed, poses, translations, are
     """Write the areas R, B, Y of poses, one pose per block.
 
     Args:
-        chain: A `Chain`.
-        radii: (26, 2) metres.
-        view: (16,): rotation, translation, focal lengths, centre.
+        chain: The skeleton, a `Chain`.
+        radii: Radii (26, 2) of the bones' cones, in metres.
+        view: Rotation, translation, focal lengths and centre in one array (16,).
         size: Width and height in pixels.
         observed: The bit images (strips, rows) of the person and of valid pixels, as
             32-bit words in the layout of `rasteriser`, and the number of the person's
             pixels (1,).
-        poses: (n, 66).
-        translations: (n, 3) metres.
-        areas: (n, 3), the output.
+        poses: The poses (n, 66).
+        translations: The positions (n, 3) of their roots, in metres.
+        areas: The areas (n, 3) in pixels, which are written.
     """
     width, height = size
     person, valid, pixels = observed

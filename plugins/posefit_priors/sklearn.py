@@ -160,7 +160,7 @@ def _linear(model: Any, components: int) -> tuple[Array, Array] | None:
         ) from None
     if images.shape != (len(probe), 63):
         raise InputError(
-            "variant must give back 63 angles, "
+            "variant must have an inverse to 63 angles, "
             f"got {images.shape[1:]} from {type(model).__name__}"
         )
     matrix = images[1:-1] - images[0]

@@ -145,10 +145,10 @@ class Retargeted:
 
     Attributes:
         skeleton: A skeleton with the rig's bones.
-        poses: Angles (T, 66).
-        places: Root joint (T, 3).
+        poses: Poses (T, 66).
+        places: Positions (T, 3) of the root joint.
         filled: Names of the bones that the rig does not have.
-        off: Greatest distance of a joint from its place in the rig.
+        off: The greatest distance of a joint from its place in the rig.
     """
 
     skeleton: Skeleton

@@ -70,7 +70,7 @@ def serve(
                 state.restore()
             answer = cloudpickle.dumps((result, None))
         except MemoryError:
-            reason = f"it wanted more memory than its limit of {gigabytes:g} GB"
+            reason = f"it needed more memory than its limit of {gigabytes:g} GB"
             answer = pickle.dumps((None, reason))
         # also SystemExit: a cell that exits must not end its worker
         except BaseException as error:

@@ -173,7 +173,7 @@ def used_twice(case: Case) -> None:
     """A tracker that has tracked before gives the same track again."""
     expect(
         case.same(case.first.tracker),
-        "a second track must be as the first, got another",
+        "a second track must equal the first, got another",
     )
 
 
