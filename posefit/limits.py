@@ -62,6 +62,7 @@ class timed:  # noqa: N801, named like the context managers of contextlib
         ):
             return
         self._callers = signal.getitimer(signal.ITIMER_REAL)
+        # the earlier limit of a caller would end the body first
         if 0.0 < self._callers[0] <= self._limit:
             return
         self._began = time.monotonic()
@@ -75,6 +76,7 @@ class timed:  # noqa: N801, named like the context managers of contextlib
         An alarm may come while the body is entered or left. It would then end the
         caller instead, so it is repeated a little later.
         """
+        # whether this object is still being entered, or already being left
         own = (timed.__enter__.__code__, timed.__exit__.__code__)
         outside = False
         while frame is not None and not outside:

@@ -480,6 +480,7 @@ def _offers(
         add(label, Offer(kind, name, factory, owner, release, **more))
         check_hints(label, factory)
 
+    # other hooks are not called, because they may import slow libraries
     for kind in kinds:
         if kind == COMMAND:
             register = command

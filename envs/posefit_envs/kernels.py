@@ -74,6 +74,7 @@ def align_scenes(chain, scenes, joint_radii, borders, rows, poses, translations)
     many = poses.shape[1]
     block = np.empty(LANES, np.int64)
     lanes = empty_lanes()
+    # joints are placed about a root at the origin, which is then moved
     joints = np.empty((many, joint_radii.shape[1], 3))
     origins = np.zeros((many, 3))
     for i in rows:

@@ -128,4 +128,5 @@ def race_action(choice: Any, searches: int) -> Array:
 
     A choice is a whole number from 0 to `searches`.
     """
+    # 1 for the choice, and -1 for all others
     return np.asarray(2.0 * np.eye(searches + 1)[np.asarray(choice)] - 1.0)

@@ -131,7 +131,7 @@ class World:
             # only built-in motions have styles; for any other, learn from walks
             name = motion if motion in built_in.names() else "walk"
             styles += built_in.other_styles(name)
-        # two styles of one kind have the same other styles: list each only once
+        # two styles of one kind have other styles in common: list each only once
         return tuple(dict.fromkeys(styles))
 
     @property

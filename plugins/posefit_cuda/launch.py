@@ -391,11 +391,13 @@ def count_on_device(chain, radii, view, size, observed, poses, translations, are
     threads = cuda.blockDim.x
     strips = person.shape[0]
 
+    # after each step the threads wait, because the next one reads what all have written
     for a in range(thread, _ANGLES, threads):
         write_sine(a, poses[i, a], sines, cosines)
     if thread == 0:
         counts[0] = 0
         counts[1] = 0
+        # an empty box, which `bound` widens
         box[0] = height
         box[1] = 0
         box[2] = strips
@@ -412,6 +414,7 @@ def count_on_device(chain, radii, view, size, observed, poses, translations, are
         write_cone(b, starts[b], radii, ends, (strips, width, height), lines, bounds)
         bound(b, bounds, box)
     cuda.syncthreads()
+    # only the part of the picture that the body can cover
     rows = max(box[1] - box[0], 0)
     across = (box[3] - box[2]) // WORDS + 1
     for item in range(thread, rows * across, threads):

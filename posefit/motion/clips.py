@@ -232,6 +232,8 @@ def _check_memory(poses: int, fps: float, most: int) -> None:
 def _clips(
     source: Source, stated: FileOptions, followed: Source | None
 ) -> Iterator[SourceClip]:
+    # the followed motion is left out of the library and of folders without a word; to
+    # name it is a mistake
     if isinstance(source, str) and recorded.is_library(source):
         stem = _stem(followed)
         clips = [clip for clip in recorded.named(source) if clip.name != stem]

@@ -559,9 +559,11 @@ def _like_rest(rig: Rig, bones: Sequence[_Bone]) -> _Rest:
 
     legs = (("thigh", "shin", "femur"), ("shin", "foot", "tibia"))
     arms = (("arm", "forearm", "humerus"), ("forearm", "hand", "radius"))
+    # the legs alone decide, because rest poses hold the arms in many ways
     own = pose(True, *rig.rest)
     if degrees_off(own, legs).max() <= UPRIGHT:
         return own
+    # frames of a long file are sampled; the rest pose may still be the best
     count = rig.moving[0].shape[1]
     frames = range(0, count, max(1, count // POSES))
     poses = [own]

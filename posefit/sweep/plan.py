@@ -251,6 +251,7 @@ def _with_methods(crossed: Mapping[str, Any]) -> dict[str, Any]:
         settings: dict[str, Any] = {}
         for kind, table in (("optimiser", optimiser), ("prior", prior)):
             name = table[kind].partition(":")[0]
+            # in the entry of a part, its name may be left out of its settings' names
             for key, value in flattened("settings", table.get("settings", {})).items():
                 settings[key if "." in key else f"{name}.{key}"] = value
         method = f"{optimiser['optimiser']}@{prior['prior']}"
