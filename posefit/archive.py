@@ -23,11 +23,11 @@ from posefit.errors import InputError
 from posefit.reading import check_size, cut, quoted
 
 # most bytes of an archive's directory, which has about a hundred per array
-DIRECTORY = 100_000
-HEADER = 10_000  # most characters of the header that NumPy writes before an array
+MAX_DIRECTORY_BYTES = 100_000
+MAX_HEADER_CHARACTERS = 10_000  # of the header that NumPy writes before an array
 # most bytes of an array stored column by column, which has to be unpacked whole
-TURNED = 500_000_000
-KINDS = "biufUS"  # booleans, numbers and text: anything else would be unpickled
+MAX_COLUMN_MAJOR_BYTES = 500_000_000
+DTYPE_KINDS = "biufUS"  # booleans, numbers and text: anything else would be unpickled
 # NumPy's own ways of packing; others unpack a thousand times slower
 _PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
@@ -63,7 +63,7 @@ class Stored:
 
     def __iter__(self) -> Iterator[NDArray[Any]]:
         if self.fortran:
-            if self.nbytes > TURNED:
+            if self.nbytes > MAX_COLUMN_MAJOR_BYTES:
                 raise InputError(
                     f"{self._path}: expected {self.name} row by row, got column by "
                     f"column: save numpy.ascontiguousarray({self.name})"
@@ -152,13 +152,13 @@ class _ArchiveFile(io.FileIO):
     zipfile reads an archive's directory whole, however long it is.
     """
 
-    longest = DIRECTORY
+    longest = MAX_DIRECTORY_BYTES
 
     def read(self, size: int | None = -1) -> bytes:
         """Return the next bytes."""
         if size is not None and size > self.longest:
             raise _RefusedError(
-                f"one whose directory is longer than {DIRECTORY:,} bytes"
+                f"one whose directory is longer than {MAX_DIRECTORY_BYTES:,} bytes"
             )
         return super().read(size)
 
@@ -206,9 +206,11 @@ def _header(
     with warnings.catch_warnings():
         # NumPy warns about headers that Python 2 wrote
         warnings.simplefilter("ignore")
-        shape, fortran, dtype = np.lib.format.read_array_header_1_0(file, HEADER)
+        shape, fortran, dtype = np.lib.format.read_array_header_1_0(
+            file, MAX_HEADER_CHARACTERS
+        )
     start = file.tell()
-    if dtype.kind not in KINDS or not dtype.itemsize:
+    if dtype.kind not in DTYPE_KINDS or not dtype.itemsize:
         raise _RefusedError(f"{name} of {cut(str(dtype))}")
     stated_size = math.prod(shape) * dtype.itemsize
     if min(shape, default=0) < 0 or stated_size != size - start:

@@ -32,7 +32,7 @@ FPS = 120.0  # CMU's rate; its files do not state it
 RATE = re.compile(r"#\s*(\S{1,40}) frames a second")  # posefit writes it
 SIZE_LIMIT = 500_000_000  # bytes
 LONGEST_LINE = 10_000  # bytes; the root's line has about 60
-LEAST = 0.5  # a file whose angles are all smaller than this is of a rest pose
+MIN_DEGREES = 0.5  # if all angles of a file are smaller, it shows a rest pose
 VALUES = 20_000_000  # numbers in a file: 200,000 frames of 100 channels
 
 Spans = dict[str, tuple[int, int]]  # bone: start and stop of its values in a frame
@@ -132,7 +132,7 @@ def doubtful_angles(angles: Array, *, radians: bool) -> str:
     largest = float(np.abs(angles).max(initial=0.0))
     if radians and largest > FULL_TURN:
         return f"angles of up to {largest:.4g} radians seem to be degrees"
-    if not radians and LEAST < largest <= FULL_TURN:
+    if not radians and MIN_DEGREES < largest <= FULL_TURN:
         return f"angles of at most {largest:.3g} degrees may be radians"
     return ""
 

@@ -49,7 +49,7 @@ SQUARE = 25.0  # degrees within which a root's axes are snapped to left, up and 
 STANDING = 0.7  # least mean cosine between legs, trunk and the axis that is up
 POSES = 2_000  # most frames that are searched for one like the rest pose
 # radians: a turn below this about an axis that CMU's joints lack is a rounding error
-UNUSED = 1e-5
+MIN_TURN = 1e-5
 _ENDS_OF = {
     "hipjoint": "thigh",
     "femur": "shin",
@@ -394,7 +394,7 @@ def _skeleton(offsets: Array, poses: Array, average: Skeleton) -> Skeleton:
     A joint that turns about another axis, too, gets all three.
     """
     # (66,) whether there is a turn about an axis that CMU's joints lack
-    beyond = (np.abs(poses) > UNUSED).any(axis=0) & ~average.free
+    beyond = (np.abs(poses) > MIN_TURN).any(axis=0) & ~average.free
     used = []
     for joint in INNER:
         angle = angle_index(joint)

@@ -40,7 +40,7 @@ from posefit.suites.boxes import (
 
 SIZE = (120, 160)  # pixels
 PLACE = np.array([0.0, 0.9, 0.0])  # metres; the place of the root, where cameras aim
-AWAY = 3.5  # metres from a camera to the place
+CAMERA_DISTANCE = 3.5  # metres from a camera to the place
 FIELD = np.radians(40.0)  # field of view across the larger side
 ROOT_RANGE = np.radians([45.0, 20.0, 20.0])  # to either side: yaw, pitch, roll
 YAW_OFF = np.radians(20.0)  # the largest distance of the true yaw from the box's middle
@@ -199,7 +199,7 @@ class _Draft:
 
     def camera(self, azimuth: float) -> Camera:
         """Return a camera at an azimuth in radians."""
-        return Camera.around(PLACE, azimuth, AWAY, SIZE, FIELD)
+        return Camera.around(PLACE, azimuth, CAMERA_DISTANCE, SIZE, FIELD)
 
     def silhouette(self, camera: Camera, pose: Array) -> Silhouette:
         """Return the silhouette of the true body in a pose (66,)."""
