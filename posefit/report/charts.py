@@ -126,7 +126,7 @@ def convergence(contest: Contest, evaluations: Array) -> list[Line | None]:
         run ends.
     """
 
-    def line(place: int, rows: Array) -> Line | None:
+    def line(index: int, rows: Array) -> Line | None:
         traces: Sequence[Trace] = contest.data("traces", rows)
         if not all(len(used) for used, _ in traces):
             return None
@@ -138,12 +138,12 @@ def convergence(contest: Contest, evaluations: Array) -> list[Line | None]:
         costs = []
         for used, best in traces:
             # the last improvement at or before each point
-            places = np.searchsorted(used, points, side="right") - 1
-            costs.append(best[places])
-        means = contest.means(place, np.array(costs).T)  # of (points, runs)
+            latest = np.searchsorted(used, points, side="right") - 1
+            costs.append(best[latest])
+        means = contest.means(index, np.array(costs).T)  # of (points, runs)
         return Line(points, means.values, means.low, means.high)
 
-    return [line(place, rows) for place, rows in enumerate(contest.blocks)]
+    return [line(index, rows) for index, rows in enumerate(contest.blocks)]
 
 
 def joint_errors(contest: Contest) -> list[Intervals]:
@@ -152,11 +152,11 @@ def joint_errors(contest: Contest) -> list[Intervals]:
     The list is empty if a run lacks the error of a joint.
     """
     intervals = []
-    for place, rows in enumerate(contest.blocks):
+    for index, rows in enumerate(contest.blocks):
         joints = np.array(contest.data("joint_errors", rows))  # (blocks, 27)
         if not np.isfinite(joints).all():
             return []
-        intervals.append(contest.means(place, joints.T.astype(np.float64)))
+        intervals.append(contest.means(index, joints.T.astype(np.float64)))
     return intervals
 
 

@@ -160,11 +160,11 @@ class Searches:
         """Return the averages of some rows."""
         return runs.averages(rows)
 
-    def interval(self, contest: Contest, place: int) -> tuple[float, float]:
+    def interval(self, contest: Contest, index: int) -> tuple[float, float]:
         """Return the ends of the interval that other instances would give."""
         functions = contest.instance_field("function")
         instances = contest.instance_field("instance")
-        mean = mean_interval(contest.scores[place], functions, instances)
+        mean = mean_interval(contest.scores[index], functions, instances)
         return max(mean.low, 0.0), min(mean.high, 100.0)
 
     def baselines(self, contest: Contest) -> list[Baseline]:
