@@ -1,6 +1,6 @@
 """`python -m posefit` is `posefit`.
 
-Ctrl-C ends it with one line, also while Python still imports it.
+Ctrl-C ends it with one line, even while Python is still importing it.
 """
 
 import sys

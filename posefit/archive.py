@@ -22,18 +22,18 @@ from numpy.typing import NDArray
 from posefit.errors import InputError
 from posefit.reading import check_size, cut, quoted
 
-# bytes of an archive's directory, which has about a hundred per array
-DIRECTORY = 100_000
-HEADER = 10_000  # characters of the header that NumPy writes before an array
-# bytes of an array that is stored column by column, and so has to be unpacked whole
-TURNED = 500_000_000
-KINDS = "biufUS"  # booleans, numbers and text: anything else would be unpickled
-# packed as NumPy does; other ways unpack a thousand times slower
+# most bytes of an archive's directory, which has about a hundred per array
+MAX_DIRECTORY_BYTES = 100_000
+MAX_HEADER_CHARACTERS = 10_000  # of the header that NumPy writes before an array
+# most bytes of an array stored column by column, which has to be unpacked whole
+MAX_COLUMN_MAJOR_BYTES = 500_000_000
+DTYPE_KINDS = "biufUS"  # booleans, numbers and text: anything else would be unpickled
+# NumPy's own ways of packing; others unpack a thousand times slower
 _PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 
 class _RefusedError(InputError):
-    """The file contains something that is not read; the message says what."""
+    """The file contains something that posefit refuses; the message says what."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Stored:
 
     def __iter__(self) -> Iterator[NDArray[Any]]:
         if self.fortran:
-            if self.nbytes > TURNED:
+            if self.nbytes > MAX_COLUMN_MAJOR_BYTES:
                 raise InputError(
                     f"{self._path}: expected {self.name} row by row, got column by "
                     f"column: save numpy.ascontiguousarray({self.name})"
@@ -112,8 +112,8 @@ def archived(
         names: The arrays to look for; others are ignored.
         what: Description of the expected arrays, for messages.
         packed: Most bytes that the file may have.
-        single: If the file has only one array, take it for the first of the names,
-            which is needed.
+        single: Whether the first of the names is required; the only array of a file
+            is taken for it, whatever its name.
 
     Raises:
         InputError: The file is damaged or too large, or has several arrays and none of
@@ -152,13 +152,13 @@ class _ArchiveFile(io.FileIO):
     zipfile reads an archive's directory whole, however long it is.
     """
 
-    longest = DIRECTORY
+    longest = MAX_DIRECTORY_BYTES
 
     def read(self, size: int | None = -1) -> bytes:
         """Return the next bytes."""
         if size is not None and size > self.longest:
             raise _RefusedError(
-                f"one whose directory is longer than {DIRECTORY:,} bytes"
+                f"one whose directory is longer than {MAX_DIRECTORY_BYTES:,} bytes"
             )
         return super().read(size)
 
@@ -196,7 +196,7 @@ def _header(
 
     Args:
         file: The array's file.
-        name: Of the array, for messages.
+        name: The array's name, for messages.
         size: Bytes of the file.
     """
     version = np.lib.format.read_magic(file)
@@ -204,11 +204,13 @@ def _header(
     if version != (1, 0):
         raise _RefusedError(f"{name} in NumPy's format {version}")
     with warnings.catch_warnings():
-        # about headers that Python 2 wrote
+        # NumPy warns about headers that Python 2 wrote
         warnings.simplefilter("ignore")
-        shape, fortran, dtype = np.lib.format.read_array_header_1_0(file, HEADER)
+        shape, fortran, dtype = np.lib.format.read_array_header_1_0(
+            file, MAX_HEADER_CHARACTERS
+        )
     start = file.tell()
-    if dtype.kind not in KINDS or not dtype.itemsize:
+    if dtype.kind not in DTYPE_KINDS or not dtype.itemsize:
         raise _RefusedError(f"{name} of {cut(str(dtype))}")
     stated_size = math.prod(shape) * dtype.itemsize
     if min(shape, default=0) < 0 or stated_size != size - start:

@@ -143,7 +143,7 @@ def compare(
         1
     """
     factories: dict[str, tuple[Callable[..., Any], str]] = {}
-    # makes the keys of this call differ from all earlier ones of the same factories
+    # random, so that keys differ from those of earlier calls with these factories
     call = token_hex(4)
     entries = [_named(entry, call, factories) for entry in methods]
     register(factories)
@@ -183,7 +183,7 @@ def _named(
 ) -> Any:
     """Return an entry of methods with a name instead of a factory.
 
-    Adds the factory and the word for this call to `factories`.
+    Adds the factory, with `call` in place of a digest of its source, to `factories`.
     """
     if isinstance(entry, Mapping):
         return {**entry, "method": _named(entry.get("method"), call, factories)}

@@ -116,7 +116,7 @@ def fitted(hint: Any, value: Any) -> Any:
 def read(hint: Any, text: str) -> Any:
     """Return the value of a text by a hint.
 
-    For a tuple `3,4.5` is two numbers, for a str it is a text.
+    With the hint of a tuple `3,4.5` is two numbers; with `str` it is a text.
 
     Raises:
         UnfitError: The text has no meaning.
@@ -221,7 +221,7 @@ def _plain(hint: Any) -> Any:
 
 
 def choices_of(hint: Any) -> tuple[Any, ...]:
-    """Return the choices of a `Literal`, or of a union of such and None; else ()."""
+    """Return the choices of a `Literal`, or of a union of these and None; else ()."""
     hint = _plain(hint)
     if get_origin(hint) is Literal:
         return get_args(hint)

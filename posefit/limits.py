@@ -18,12 +18,13 @@ SECONDS = 1e-3, 1e8  # range of a time limit that operating systems' timers acce
 GIGABYTES = 1e-3, 1e6
 RATES = 1e-3, 1e6  # frames per second
 HEIGHTS = 0.3, 2.8  # stature of a person, metres
-AGAIN = 1.0  # seconds between repeated interrupts, for code that swallowed the first
+# between repeated interrupts, for code that swallowed the first one
+REPEAT_SECONDS = 1.0
 PARENT_POLL_SECONDS = 0.5
-# seconds left of a timer that should have ended meanwhile; 0 would switch it off
-SOON = 1e-6
-# seconds until an alarm that arrived before the `with` block began is repeated
-EARLY = 1e-3
+# set for a caller's timer that should have ended meanwhile; 0 would switch it off
+OVERDUE_SECONDS = 1e-6
+# until an alarm that arrived while the `with` block began or ended is repeated
+RETRY_SECONDS = 1e-3
 # environment variable that `check_decoded` reads, and its default
 DECODED = "POSEFIT_DECODED_GIGABYTES"
 DECODED_GIGABYTES = 20.0
@@ -62,12 +63,13 @@ class timed:  # noqa: N801, named like the context managers of contextlib
         ):
             return
         self._callers = signal.getitimer(signal.ITIMER_REAL)
+        # the earlier limit of a caller would end the body first
         if 0.0 < self._callers[0] <= self._limit:
             return
         self._began = time.monotonic()
         self._before = signal.signal(signal.SIGALRM, self._stop)
         self._runs = True
-        signal.setitimer(signal.ITIMER_REAL, self._limit, AGAIN)
+        signal.setitimer(signal.ITIMER_REAL, self._limit, REPEAT_SECONDS)
 
     def _stop(self, _: int, frame: FrameType | None) -> None:
         """End the body.
@@ -75,6 +77,7 @@ class timed:  # noqa: N801, named like the context managers of contextlib
         An alarm may come while the body is entered or left. It would then end the
         caller instead, so it is repeated a little later.
         """
+        # whether this object is still being entered, or already being left
         own = (timed.__enter__.__code__, timed.__exit__.__code__)
         outside = False
         while frame is not None and not outside:
@@ -83,7 +86,7 @@ class timed:  # noqa: N801, named like the context managers of contextlib
         if not self._runs:
             return
         if outside:
-            signal.setitimer(signal.ITIMER_REAL, EARLY, AGAIN)
+            signal.setitimer(signal.ITIMER_REAL, RETRY_SECONDS, REPEAT_SECONDS)
         else:
             raise _OvertimeError
 
@@ -96,7 +99,7 @@ class timed:  # noqa: N801, named like the context managers of contextlib
         callers, again = self._callers
         if callers:
             left = callers - (time.monotonic() - self._began)
-            signal.setitimer(signal.ITIMER_REAL, max(left, SOON), again)
+            signal.setitimer(signal.ITIMER_REAL, max(left, OVERDUE_SECONDS), again)
         if isinstance(error, _OvertimeError):
             raise TimeoutError from error  # the cause's traceback says where it was
 
@@ -150,7 +153,7 @@ def check_decoded(name: str, size: int) -> None:
     Such masks take time rather than memory if they are unpacked frame by frame.
 
     Args:
-        name: Of the masks, for the message.
+        name: The name of the masks, for the message.
         size: Bytes that they unpack to.
     """
     text = os.environ.get(DECODED, "")

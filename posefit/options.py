@@ -46,7 +46,7 @@ class Option(NamedTuple):
 
 
 def option(default: Any, text: str, *more: Any, **others: Any) -> Any:
-    """Return the dataclass field of an option; the rest is as in `Option`."""
+    """Return the dataclass field of an option; `Option` explains the arguments."""
     return field(default=default, metadata={"option": Option(text, *more, **others)})
 
 

@@ -14,17 +14,17 @@ from typing import Any
 
 from posefit.errors import InputError, printable
 
-# what other libraries call things of posefit
+# names that other libraries use, with the names in posefit
 OTHER_WORDS = {
     "optimizer": ("optimiser", "method"),
     "optimizers": ("optimisers", "methods"),
     "optimisers": ("methods",),
 }
 SHOWN = 80  # characters of a name or value in a message
-DOTS = 1_000  # most dots in a line of TOML, except in decimal numbers
+MAX_DOTS = 1_000  # most dots in a line of TOML, except in decimal numbers
 # greatest sum of the squared numbers of dots over all lines: reading a key of n parts
 # takes memory as n squared. A plan that names 300 files on each of 10 lines has 1e6.
-NESTING = 10_000_000
+MAX_SQUARED_DOTS = 10_000_000
 _DECIMAL = re.compile(r"(?<![\w.])[-+]?\d+\.\d+(?:[eE][-+]?\d+)?(?![\w.])")
 
 
@@ -151,7 +151,7 @@ def parsed_toml(text: str) -> dict[str, Any]:
         else:
             dots = 0
         weight += dots * dots
-        if dots > DOTS or weight > NESTING:
+        if dots > MAX_DOTS or weight > MAX_SQUARED_DOTS:
             raise InputError(
                 f"expected less deeply nested keys, got {dots} dots in line {number}"
             )

@@ -51,14 +51,14 @@ class Offer:
     """One registered name.
 
     Attributes:
-        kind: Kind of plugin.
-        name: The name.
+        kind: The kind of plugin.
+        name: The name that users give.
         factory: Takes the arguments of its kind, and keyword-only settings.
         distribution: The installed package that registered it.
-        version: Of the distribution.
+        version: The version of the distribution.
         next_frame: What becomes of an optimiser in the next frame.
-        looks_ahead: Whether a tracker does.
-        still_background: Whether a segmenter needs one.
+        looks_ahead: Whether a tracker reads later frames first.
+        still_background: Whether a segmenter needs a still background.
         needs: A module that the factory imports, and what to install for it.
     """
 
@@ -127,14 +127,14 @@ class Plugin(NamedTuple):
     """One entry point, and its offers.
 
     Attributes:
-        name: Of the entry point.
+        name: The name of the entry point.
         distribution: The installed package.
-        version: Of the distribution.
+        version: The version of the distribution.
         state: What happened when it was loaded.
         cause: Why it is not loaded.
-        offers: Of the kinds that were asked for.
-        commands: If commands were asked for.
-        traceback: Of the error that broke it.
+        offers: What it registered, of the requested kinds.
+        commands: The commands that it registered, if these were requested.
+        traceback: The traceback of the error that broke it.
     """
 
     name: str
@@ -222,8 +222,8 @@ class Registry:
     def hint(self, name: str, known: Iterable[str]) -> str:
         """Return the end of a message about an unknown name.
 
-        It says of which other kind the name is, or gives the nearest known name or the
-        command that lists them.
+        It names the other kind that has this name, or else the nearest known name or
+        the command that lists the known names.
         """
         kinds = [kind for kind, offers in self.offers.items() if name in offers]
         if kinds:
@@ -423,7 +423,7 @@ def _offers(
     release: str,
     owners: Mapping[str, str],
 ) -> "dict[str, Offer | click.Command]":
-    """Return a plugin's offers, by its name in errors. Let all errors through."""
+    """Return a plugin's offers by their names in messages. Errors are not caught."""
     if point.group != PROJECT:
         raise InputError(
             f"its entry point must be in the group {PROJECT!r}, got {point.group!r}"
@@ -480,6 +480,7 @@ def _offers(
         add(label, Offer(kind, name, factory, owner, release, **more))
         check_hints(label, factory)
 
+    # other hooks are not called, because they may import slow libraries
     for kind in kinds:
         if kind == COMMAND:
             register = command

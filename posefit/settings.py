@@ -45,7 +45,7 @@ def settings_of(factory: Callable[..., Any]) -> tuple[Setting, ...]:
 
 @lru_cache
 def _settings_of(factory: Callable[..., Any]) -> tuple[Setting, ...]:
-    """Return the same, and keep it: a signature takes long to read."""
+    """Return what `settings_of` does, cached: reading a signature is slow."""
     settings = []
     for parameter in inspect.signature(factory).parameters.values():
         # only hints of settings are resolved: others may name types that are imported
@@ -76,7 +76,8 @@ def settings_in(text: str) -> dict[str, tuple[str, str]]:
 
     Such a list is a line `Settings:`, then an indented line `name (symbol): meaning`
     for each setting, which may continue in lines with more indentation. The symbol is
-    the source's letter, and is "" if it is missing. Without a list the result is empty.
+    the letter in the publication, and is "" if it is missing. Without a list the result
+    is empty.
     """
     listed = _LIST.search(text)
     if not listed:
@@ -261,7 +262,7 @@ def _known(plugin: str, name: str, known: Mapping[str, Setting]) -> Setting:
         if known:
             listed = f"one of {', '.join(known)}"
         else:
-            listed = "none, it takes none"
+            listed = "left out, because it takes none"
         near = suggestion(name, known)
         raise InputError(
             f"a setting of {plugin} must be {listed}, got {quoted(name)}{near}"

@@ -78,7 +78,7 @@ MODULES = (
 )
 CELL = "cell"  # a change of `cell.FIELD` is one of the cell's fields
 AS_IT_IS = "as it is"
-# Constants that are not halved and doubled, by the reason.
+# Constants that are not halved and doubled, by the reason why not.
 FIXED: Mapping[str, Sequence[str]] = {
     "they follow from other constants": (
         "MIN_EVALUATIONS",
@@ -122,9 +122,9 @@ FIXED: Mapping[str, Sequence[str]] = {
         "WRONG_YAW_COST",
     ),
 }
-OFF = 1e9  # of a spread or a cost: so large that what depends on it says nothing
-TINY = 1e-9  # of a share or a cost
-FRAMES = 24  # of a clip, at most
+OFF = 1e9  # a spread or a cost so large that what depends on it has no effect
+TINY = 1e-9  # a share or a cost that is as good as 0
+FRAMES = 24  # most frames of a clip
 
 
 def no_pull(_noise: float) -> Array:
@@ -171,9 +171,9 @@ class Situation(NamedTuple):
     """The conditions of some of the tracks."""
 
     views: Views
-    every: int  # one of so many tracks has them
-    fields: Mapping[str, Any]  # of the cell
-    frames: int = FRAMES  # of a clip, at most
+    every: int  # of this many tracks, one has the conditions
+    fields: Mapping[str, Any]  # fields of the cell
+    frames: int = FRAMES  # most frames of a clip
 
 
 SITUATIONS: Mapping[str, Situation] = {
@@ -189,7 +189,7 @@ class Run(NamedTuple):
 
     change: str
     situation: str
-    number: int  # of the clip, and the seed
+    number: int  # the number of the clip, and the seed
 
 
 def constants() -> dict[str, Change]:
@@ -314,7 +314,7 @@ def clip_of(number: int) -> Clip:
 def jobs_of(
     changes: Mapping[str, Change], tracks: int, situations: Sequence[str]
 ) -> dict[Run, Callable[[], dict[str, Any]]]:
-    """Return the tracks that are compared, by what they are of."""
+    """Return the jobs that track each run, by run."""
     jobs: dict[Run, Callable[[], dict[str, Any]]] = {}
     for number in range(tracks):
         for name in situations:
@@ -422,7 +422,7 @@ def _percent(log: float) -> str:
 )
 @click.option("--tracks", type=click.IntRange(1), default=24, show_default=True)
 @click.option(
-    "--only", multiple=True, metavar="TEXT", help="Changes whose name holds this."
+    "--only", multiple=True, metavar="TEXT", help="Changes whose name contains this."
 )
 @click.option(
     "--situation",

@@ -2,9 +2,9 @@
 
     python docs/studies/agents.py --rows agents.jsonl --picture agents.png
 
-All are tested on held-out instances. A learner's row is one training: of
-Stable-Baselines3's PPO, on the answers to silhouettes, or on these first. A search's
-row has every instance once. There is a table for each level.
+All are tested on held-out instances. A learner's row is one training: by
+Stable-Baselines3's PPO, by cloning the answers to silhouettes, or by cloning and then
+PPO. A search's row has every instance once. There is a table for each level.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -44,27 +44,27 @@ LEVELS = {
 }
 BUDGETS = (8, 40, 200, 800, 2440)  # evaluations of blind searches
 SEARCHES = ("sapso", "cma")
-# what learns nothing: the k-th proposal of the look-up is the truth of the training
-# instance whose silhouette is the k-th most similar
+# references that learn nothing: the k-th proposal of the look-up is the truth of the
+# training instance whose silhouette is the k-th most similar
 LOOK_UP = "look-up"
 LOOKED_UP = 10_000  # training instances
 LOOKED_UP_AT_ONCE = 500
-# the same among silhouettes that are drawn near the training people's poses, without
-# damage
+# the same look-up among silhouettes that are drawn near the training people's poses,
+# without damage
 DRAWN_LOOK_UP = "look-up of drawn silhouettes"
 DRAWN_SILHOUETTES = 400_000
 DRAWN_OF_INSTANCE = 40
 LOOK_UPS = (LOOK_UP, DRAWN_LOOK_UP)
 CONSTANTS = ("uniform", "the truth, projected", *LOOK_UPS)
 COMPARED_AT_ONCE = 20  # pictures: more take a gigabyte
-# taught on the answers to training silhouettes, or to silhouettes that are drawn; see
-# pose_network.py
+# networks that are taught the answers to training silhouettes, or to silhouettes that
+# are drawn; see pose_network.py
 CLONING = "cloning"
 POSING = "pose network"
 DRAWN = {CLONING: 0.0, POSING: 0.7}  # share of drawn silhouettes
 TAUGHT_STEPS = 240_000
 TEACHERS = 256  # environments
-# PPO, and PPO that goes on from a pose network
+# PPO, and PPO that continues from a pose network
 CONTINUED = "pose network, then PPO"
 LEARNERS = (CLONING, "PPO", POSING, CONTINUED)
 ENVIRONMENTS = 64
@@ -72,7 +72,7 @@ ROLLOUT = 16
 BATCH = 256
 EPOCHS = 6
 LEARNING_RATE = 1.5e-3
-CLIP = 0.2  # of the ratio of probabilities
+CLIP = 0.2  # PPO's clip of the ratio of probabilities
 LOG_DEVIATION = -1.6
 SHOWN = (12, 16)  # height and width of small pictures, where nothing is corrected
 NETWORKS: dict[str, list[int]] = {"pi": [384, 128], "vf": [128]}  # hidden layers

@@ -48,7 +48,7 @@ SHOWN_FRAMES = {
     "of the fourth to sixth": slice(3, 6),
     "of last ones": slice(-1, None),
 }
-DIMENSIONS = 9  # of a proposal
+DIMENSIONS = 9  # coordinates of a proposal
 
 
 def stacked(count: int, split: str) -> tuple[Any, Any]:

@@ -12,9 +12,10 @@ of the films by one camera have landmarks that sometimes exchange left and right
 films are tracked with five seeds.
 
 Each track is stored in the folder, and the same command continues there. The report
-says what intervals lack, learned from all bodies; each body is judged by what the
-others teach. With `--legs`, thighs and shanks have the girths and lengths of a
-published survey, and their flesh is behind the bones, as it is; others stand upright.
+has the errors that the intervals do not contain yet, learned from all bodies; each body
+is judged by what is learned from the others. With `--legs`, thighs and shanks have the
+girths and lengths of a published survey, and their flesh is behind the bones, as it is
+in people. Some of these people stand upright.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -155,8 +156,8 @@ WRONG_GOOD = 0.02  # share of the wrong tracks that may be good
 # turn of one thigh; share by which a cycle runs faster and slower
 LIMP_DEGREES = 7.0
 LIMP_WARP = 0.15
-# Of people who stand upright, at most. The library's, whose joints are those of a
-# skeleton fitted to markers, stand with knees bent by 8 degrees or more.
+# The most that people who stand upright bend their knees. Those of the library, whose
+# joints are of a skeleton that was fitted to markers, bend them by 8 degrees or more.
 STRAIGHT_DEGREES = 5.0
 
 
@@ -227,7 +228,7 @@ class Shot(NamedTuple):
     views: int
     body: int
     landmarks: bool = False
-    seed: int = 0  # of the track
+    seed: int = 0  # seed of the track
     legs: bool = False  # whether the legs have published shapes
 
     @property

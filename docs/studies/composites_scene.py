@@ -114,7 +114,7 @@ PEOPLE = 25  # grey levels: a pixel that ever differs by more shows a person
 SEEN = (1240, 697)  # pixels of the part that a camera sees
 # left and top of each camera's part
 CORNERS = ((260, 297), (0, 297), (120, 250), (330, 200))
-FLICKER = 0.012  # of the brightness, slowly; and a third as much from frame to frame
+FLICKER = 0.012  # slow change of the brightness; a third of it from frame to frame
 NOISE = 2.0  # grey levels, of the sensor
 
 

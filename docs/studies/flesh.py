@@ -3,7 +3,7 @@
 bodies.py and knees.py import this module; it prints nothing.
 
 The tracker's thigh and shank are one cone each, whose ends have a fixed ratio of radii.
-People's are not. Here a leg is a chain of discs whose girths are measured ones: those
+Real legs are not like that. Here a leg is a chain of discs with measured girths: those
 of ANSUR II (Gordon et al. 2014, NATICK/TR-15/007; ANSUR_II_MALE_Public.csv and
 ANSUR_II_FEMALE_Public.csv, 4082 men and 1986 women, with equal weight of both sexes).
 Nor does the flesh surround the line between two joints: most of it is behind.
@@ -21,7 +21,7 @@ from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import BONES, JOINTS, PARENTS, kind
 from posefit.silhouette.mask import Mask
 
-# Of girths over stature, thigh (below the buttock), lower thigh (above the kneecap),
+# Girths over stature, of thigh (below the buttock), lower thigh (above the kneecap),
 # calf (the largest) and ankle (the smallest): geometric means, standard deviations of
 # the logarithms, and correlations.
 GIRTHS = np.array([0.3657, 0.2388, 0.2258, 0.1313])
@@ -113,8 +113,8 @@ def painted(body: Body, legs: Legs, camera: Camera, pose: Array, place: Array) -
         body: The body, whose other bones are cones.
         legs: The discs of its thighs and shanks.
         camera: The camera.
-        pose: (66,).
-        place: (3,) metres, of the root.
+        pose: The pose (66,).
+        place: The position (3,) of the root, in metres.
     """
     skeleton = body.skeleton
     joints = skeleton.joints(pose[None], place[None])[0]

@@ -39,7 +39,7 @@ from table import WORKERS, bar, markdown
 
 METHODS = ("cma", "scipy", "pso", "sapso", "annealed")  # scipy: differential evolution
 BUDGETS = (10, 100, 1000, 10_000)  # evaluations for each dimension
-INSTANCES = 8  # of each function
+INSTANCES = 8  # instances of each function
 BBOB = (1, 2, 3, 6, 8, 10, 13, 15, 16, 17, 21, 24)
 # random points; descents, and their evaluations for each dimension
 POINTS = 1000
@@ -61,7 +61,7 @@ ACROSS = 3
 Cost = Callable[[Array], Array]
 Row = Mapping[str, float]  # a function's features
 Key = tuple[int, int]  # function, dimension
-Shares = dict[str, list[float]]  # of targets, or costs, by method, after each budget
+Shares = dict[str, list[float]]  # shares or costs by method, after each budget
 COMPARED = (
     "conditioning",
     "elsewhere",
@@ -109,6 +109,7 @@ def conditioning(
     for _ in range(ROUNDS):
         turned = rng.standard_normal((2 * d * d, d))
         turned /= np.linalg.norm(turned, axis=1, keepdims=True)
+        # on an ellipsoid 1 / distance^2 is a quadratic form of the direction: fit it
         rows = turned[:, upper[0]] * turned[:, upper[1]]
         inverse = np.mean(
             [
@@ -123,6 +124,7 @@ def conditioning(
         axes = axes @ vectors / np.sqrt(values.clip(values[-1] / 30.0))
         lengths = np.linalg.svd(axes, compute_uv=False)
         ratios.append(2.0 * np.log(lengths[0] / lengths[-1]))
+    # the first half of the rounds only finds the axes
     return float(np.exp(np.mean(ratios[ROUNDS // 2 :])))
 
 
@@ -134,6 +136,7 @@ def _distance(cost: Cost, best: Array, ways: Array, level: float) -> Array:
     costs = cost(
         (best + ways[:, None] * REACH[:, None]).reshape(-1, len(best))
     ).reshape(len(ways), -1)
+    # the first distance at the level or above it, and the one before
     over = costs >= level
     k = over.argmax(axis=1).clip(1)
     n = np.arange(len(ways))

@@ -47,19 +47,19 @@ from table import markdown
 
 FPS = 30.0
 FILM_SIZE = (320, 240)  # width and height of most films
-# of a method that is cheap, so that what surrounds a search shows
+# options of a cheap method, so that the cost of everything around a search shows
 CHEAP: dict[str, Any] = {"method": "sapso@pca", "evaluations": 40}
 KNOWN_FRAMES = (0, 120)
 STREAM_FPS = 100.0
 ENVIRONMENT = "posefit_envs:posefit/FitImage-v1"
 ENVIRONMENT_STEPS = 256
 STEPPED_ENVIRONMENTS = 4096
-FITTED_SIZES = 4  # of a fit, at least
+FITTED_SIZES = 4  # fewest sizes for a fit
 FLAT = 0.05  # what grows by less than this share is flat
 # a report compares this many methods
 METHODS = 10
 POSES = 400
-PORT = 8786  # of a Dask scheduler
+PORT = 8786  # port of a Dask scheduler
 WIDTHS = (80, 160, 320, 640, 1280)
 VIEWS = (1, 2, 4, 8)
 COMPONENTS = (3, 6, 12, 24, 48)
@@ -338,7 +338,7 @@ class Row:
         unit: What its sizes count.
         sizes: The sizes, each about twice the one before.
         work: Does the work of a size in a folder.
-        prepare: Prepares the folder before.
+        prepare: Prepares the folder beforehand.
         of: An extrapolated size, and what it is called.
     """
 

@@ -47,7 +47,7 @@ BODIES = 10
 NUMBERS = {"aslant": (0, 2, 1), "through": (3, 6, 5, 2, 1, 0, 4)}
 FITS = 2  # fits after each other, as a track has
 LEVEL = 0.8
-# Who stands: their joints are slower, and their ankles at one height.
+# A person stands if their joints are slower than this, and their ankles level.
 STILL = 0.15  # metres a second
 LEVEL_ANKLES = 0.05  # metres
 TALL = 0.03  # metres that the pelvis may be below its highest places

@@ -160,7 +160,7 @@ ALL_CHANGES = {
 }
 CONDITIONS: Mapping[str, Mapping[str, Any]] = {CLEAN: {}, **CHANGES, MASKS: ALL_CHANGES}
 VIEWS: tuple[Views, ...] = (*SIDES, *PAIRS)
-FRAMES = 48  # at most, of a clip
+FRAMES = 48  # most frames of a clip
 ON_THE_SPOT: dict[str, tuple[Clip, ...]] = {
     "gestures": (
         Clip("29_05", FRAMES, 1, "moves their arms"),
@@ -378,7 +378,7 @@ def _logistic(
     return {"weights": named, "bias": round(bias, DIGITS)}
 
 
-RECALL = 0.95  # of lost frames, for which false alarms are counted
+RECALL = 0.95  # recall of lost frames at which false alarms are counted
 
 
 def row_of(cell: TrackCell, track: Case) -> dict[str, Any]:
@@ -494,7 +494,7 @@ def lost_lines(
 @WORKERS
 def main(rows: str | None, store: str | None, workers: int | None) -> None:
     with new_file(store) if store else nullcontext() as stored:
-        # all cells are made, and thereby checked, before any runs
+        # all cells are made, and so checked, before any of them runs
         cells = [(track, cell_of(track.spec)) for track in cases()]
         jobs = {
             (track.group, track.clip.name, *track[2:]): partial(row_of, cell, track)

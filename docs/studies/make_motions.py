@@ -38,8 +38,8 @@ from posefit.motion.amc import read_clip
 from posefit.motion.asf import parse_asf
 from posefit.motion.built_in import activity_of
 
-PHASES = 48  # of a cycle, for which the arms are computed
-SWING = np.radians(28.0)  # of a waving forearm, to either side of upright
+PHASES = 48  # phases of a cycle for which the arms are computed
+SWING = np.radians(28.0)  # swing of a waving forearm, to either side of upright
 WAVES = 2  # per cycle
 BOB = np.radians(5.0)  # outstretched arms sink and rise once per cycle
 

@@ -18,7 +18,7 @@ from posefit.output.drawing import BACKGROUND, TEXT, draw_body, write
 from posefit.sweep.cell import cell_scene
 from posefit.sweep.check import cell_of
 
-STILLS = 4  # of the film, between best and worst frame
+STILLS = 4  # stills of the film, between its best and its worst frame
 SIDE = 208  # pixels of a still
 SILHOUETTE = (150, 150, 150)
 SOLID = 0.75  # opacity of the body on the silhouette

@@ -193,7 +193,7 @@ def recovery_lines(workers: int | None) -> Iterator[str]:
 
     There is a row for each kind of absence and of translation.
     """
-    # all cells are made, and thereby checked, before any runs
+    # all cells are made, and so checked, before any of them runs
     jobs = {}
     for clip, view, kind, translation in product(
         GROUPS[WALKS][:WALKERS], SIDES[1:3], KINDS, TRANSLATIONS

@@ -18,7 +18,7 @@ from posefit_envs.corrections import REACH, features, shrunk
 CORRECTIONS = 2  # per silhouette
 SILHOUETTES = 6  # for each instance, before others are drawn
 POOLS = {1: 2048, 9: 6144}  # training instances, by the number of motions
-SPREAD = 0.3  # of the answers around true poses, in half-ranges of the box
+SPREAD = 0.3  # spread of answers around true poses, in half-ranges of the box
 TILTS = 0.5  # pitch and roll are drawn from a narrower spread
 NOISE = 0.1  # largest deviation of a proposal in training
 LEARNING_RATE = 1e-3
@@ -40,8 +40,8 @@ def teach(network: Any, env: Any, seed: int, steps: int, drawn: float) -> None:
         network: A module of torch, from the observations of
             `posefit_envs.Corrections` to actions.
         env: The vector, without wrappers.
-        seed: Of the silhouettes.
-        steps: Steps of the environment.
+        seed: Seed of the silhouettes.
+        steps: Number of steps of the environment.
         drawn: Share of silhouettes that are drawn near a person's pose. The others are
             the instances' silhouettes, and the answers their `truth`.
     """
@@ -99,7 +99,7 @@ class Instances:
         return shrunk(self.env.step(proposals)[0][..., 1::2])
 
     def boxed(self, proposals: Array) -> Array:
-        """Return proposals within the box; an unknown yaw goes round."""
+        """Return proposals within the box; an unknown yaw wraps around."""
         proposals = proposals.copy()
         if self.turns:
             proposals[:, 0] = (proposals[:, 0] + 1.0) % 2.0 - 1.0

@@ -97,6 +97,7 @@ def halving(observation: Any, _: int) -> Array:
     # the observed budget is float32
     done = np.minimum(np.floor(parts * (1.0 - common[..., 1]) + 1e-6), parts - 1)
     ranks = features[..., 0].argsort(axis=-1, kind="stable").argsort(axis=-1)
+    # each finished part has left half as many searches
     left = ranks < searches // 2.0 ** done[..., None]
     return race_action(
         np.where(left, features[..., 3], np.inf).argmin(axis=-1), searches
@@ -115,6 +116,7 @@ def bandit(observation: Any, step: int, *, curiosity: float) -> Array:
     searches = int(features.shape[-2])
     used = np.asarray(features[..., 3])
     total = step + searches
+    # observed shares of the budget become generations, of which the total is known
     generations = used / used.sum(axis=-1, keepdims=True) * total
     index = features[..., 0] - curiosity * np.sqrt(np.log(total) / generations)
     return race_action(index.argmin(axis=-1), searches)

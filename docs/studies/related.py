@@ -37,7 +37,7 @@ class Sentence(NamedTuple):
     says: str
     method: str
     reference: str
-    figure: str  # of a row; it must be higher for the method
+    figure: str  # a row's figure, which must be higher for the method
     rows: Callable[[Condition], bool] = lambda _: True
 
 

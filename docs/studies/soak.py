@@ -3,8 +3,8 @@
     python docs/studies/soak.py --seconds 10800 --share 0.2
 
 Environments are stepped, a small sweep is run again and again, and a stream of masks is
-tracked live, each in a process of its own that works for a `share` of the time. A line
-a sample goes to `--out`. The table compares the medians of the first and of the last
+tracked live, each in a process of its own that works for a `share` of the time. Each
+sample is a line of `--out`. The table compares the medians of the first and of the last
 tenth, without the first hundredth, in which caches fill.
 """
 
@@ -31,7 +31,7 @@ from posefit.cli.output import Command
 from table import markdown
 
 SAMPLE_SECONDS = 5.0
-START_SHARE = 0.01  # of the time, in which caches fill
+START_SHARE = 0.01  # share of the time in which caches fill
 TENTH = 0.1
 LIVE_FPS = 4.0
 LIVE_SIZE = (160, 120)

@@ -57,7 +57,7 @@ WRONG_DEGREES = 60.0
 LOOKED = 4
 SEARCHED = 3
 FITTED = 2
-FRAMES = 20  # of a tracked clip
+FRAMES = 20  # frames of a tracked clip
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ from posefit_reproduce.jobs import each
 Row = Mapping[str, Any]
 K = TypeVar("K", bound=Hashable)
 SHARES = ("lost_rate", "swap_rate")
-RESAMPLES = 2000  # of a bootstrap
+RESAMPLES = 2000  # resamples of a bootstrap
 WORKERS = click.option(
     "--workers",
     type=click.IntRange(1),
@@ -78,7 +78,7 @@ def earlier(path: str | None, key: Callable[[Row], K]) -> dict[K, Row]:
 def kept(
     path: str | None, ended: Iterator[tuple[K, Row]], count: int
 ) -> Iterator[tuple[K, Row]]:
-    """Yield rows under their keys as they come, and write each to the file, if any."""
+    """Yield finished rows under their keys, and write each to the file, if any."""
     for key, row in bar(ended, count):
         if path is not None:
             with Path(path).open("a", encoding="utf-8") as file:

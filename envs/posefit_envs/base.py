@@ -51,7 +51,7 @@ def checked_world(env: object, arguments: Mapping[str, Any]) -> World:
     parameters = inspect.signature(type(env)).parameters.values()
     own = [each.name for each in parameters if each.kind is each.KEYWORD_ONLY]
     world = world_of(own, **arguments)
-    # names motions and priors that are unknown
+    # fitted now, so that an unknown motion or prior is reported before the first reset
     checked(lambda: world.learned)
     return world
 
@@ -89,7 +89,7 @@ def checked_actions(
     if not env.warned:
         logger.warn(
             "actions must lie in [-1, 1], "
-            f"got {largest:.6g} from 0: actions are clipped from now on"
+            f"got one of size {largest:.6g}: actions are clipped from now on"
         )
         env.warned = True
     return np.clip(values, -1.0, 1.0, out=values)
@@ -127,9 +127,9 @@ def proposal_infos(stage: Stage, drawn: Drawn, shows_truth: bool) -> Infos:
 
 
 def infos_before(stage: Stage, shows_truth: bool) -> Infos:
-    """Return the same infos (n, ...) before the first proposal.
+    """Return the infos (n, ...) of `proposal_infos` before the first proposal.
 
-    Cost and error are infinite, and all of the silhouettes is missed.
+    Cost and error are infinite, and every pixel of the silhouettes is missed.
     """
     totals = stage.totals
     nothing = np.full(len(totals), np.inf)
@@ -165,9 +165,9 @@ class SearchEnv(Env[Any, Any], ABC):
         check_mode(render_mode)
         self.render_mode = render_mode
         self.world = checked_world(self, arguments)
-        # whether the warning about clipped actions was given
+        # whether the user has been warned that actions are clipped
         self.warned = False
-        # the instance's number; None before the first reset
+        # the number of the instance; None before the first reset
         self.number: int | None = None
         self.ended = False
         self._problem: Problem | None = None
@@ -286,16 +286,16 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         self.num_envs = checked(whole, "num_envs", num_envs, 1)
         self.threads = checked(whole, "threads", threads, 1)
         self.render_mode = render_mode
-        # whether the warning about clipped actions was given
+        # whether the user has been warned that actions are clipped
         self.warned = False
-        self.steps = np.zeros(num_envs, dtype=np.int64)  # of each episode
+        self.steps = np.zeros(num_envs, dtype=np.int64)  # taken in each episode
         self.ended = np.zeros(num_envs, dtype=bool)
         self._longest = np.inf
         if max_episode_steps is not None:
             self._longest = checked(whole, "max_episode_steps", max_episode_steps, 1)
         # random generators with their seeds, made when first used
         self._generators: dict[int, tuple[np.random.Generator, int]] = {}
-        # of the instances; -1 before the first reset
+        # the number of each instance; -1 before the first reset
         self.numbers = np.full(num_envs, -1)
         # attributes that a user has added, by their names: a value for each environment
         self._own: dict[str, tuple[Any, ...]] = {}
@@ -346,6 +346,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         mask = checked_mask(options.get("reset_mask"), self.num_envs)
         if not mask.all() and (self.numbers < 0).any():
             raise error.ResetNeeded("the first reset must be of all environments")
+        # check everything before any episode begins, so that an error changes nothing
         seeds = _seeds(seed, self.num_envs)
         numbers = self._instances(options.get("instance"))
         for i in np.flatnonzero(mask).tolist():
@@ -387,8 +388,8 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
     def begin_step(self, actions: Any) -> tuple[Array, Flags]:
         """Return the actions as float64, and which environments (n,) step.
 
-        The episodes of the others have ended: under NEXT_STEP they begin a new one
-        instead.
+        The episodes of the other environments have ended. Under NEXT_STEP these
+        environments begin new episodes instead.
         """
         proposals = checked_actions(self, actions, self.action_space.shape or ())
         self.check_reset()
@@ -430,12 +431,12 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         self.ended = terminated | truncated
         # a row has the infos of its step, unless a reset replaced it (NEXT_STEP) or
         # followed it (SAME_STEP): then it has the infos of the reset
-        going = stepping
+        has_step_infos = stepping
         begun_infos: Infos = self.reset_infos() if not stepping.all() else {}
         final: Infos = {}
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self.ended.any():
             ended = self.ended.copy()
-            going = ~ended
+            has_step_infos = ~ended
             for i in np.flatnonzero(ended).tolist():
                 last_infos = row_of(infos, i)
                 last = {"final_obs": observations[i].copy(), "final_info": last_infos}
@@ -443,7 +444,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
             self.restart(ended)
             observations[ended] = self.observe(np.flatnonzero(ended))
             begun_infos = self.reset_infos()
-        step_infos = masked_infos(going, infos, begun_infos) | final
+        step_infos = masked_infos(has_step_infos, infos, begun_infos) | final
         # Gymnasium's vectors give a reset the reward 0
         rewards = np.where(stepping, rewards, 0.0)
         return observations, rewards, terminated, truncated, step_infos
@@ -493,6 +494,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
             )
         if name in self.row_attributes:
             raise error.Error(f"{name} must be set by the options of reset")
+        # a new attribute, such as a user's label, may differ between environments
         if name in self._own or not hasattr(self, name):
             self._own[name] = tuple(values)
             return
@@ -624,7 +626,9 @@ def _seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | No
         first = checked(whole, "seed", seed, 0)
         return list(range(first, first + count))
     if len(seed) != count:
-        raise ArgumentError(f"seed must be one number or {count}, got {len(seed)}")
+        raise ArgumentError(
+            f"seed must be one number or {count} numbers, got {len(seed)}"
+        )
     seeds: list[int | None] = []
     for each in seed:
         # None leaves the environment's generator as it is

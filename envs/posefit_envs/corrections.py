@@ -20,9 +20,9 @@ else:
 
 Features = NDArray[np.float32]
 
-# pixels of a picture that a pixel of the small one has, in each direction
+# side, in pixels, of the blocks whose means are the pixels of the small pictures
 BLOCK = 4
-# reach of a correction, in half-ranges of the box; the first proposal reaches all of it
+# largest correction, in half-ranges of the box; the first action spans the whole box
 REACH = 0.3
 # an observation counts at most this many corrections since the best proposal
 MOST_FAILURES = 4
@@ -43,7 +43,7 @@ class Corrections(Wrapper):
 
     Observations have 2 p + d + 2 numbers of -1 to 1:
 
-    | numbers | of what |
+    | numbers | meaning |
     |---|---|
     | p | the observed silhouette, as means of 4 x 4 pixels, 0 to 1 |
     | p | the same, less the silhouette of the best proposal |
@@ -51,8 +51,8 @@ class Corrections(Wrapper):
     | 1 | 1 before the first proposal, else 0 |
     | 1 | corrections since the best proposal, 0 to 4, / 4 |
 
-    Infos and rewards are the environment's, and so are its problems: `best` of each is
-    the best proposal.
+    Infos, rewards and problems are those of the wrapped environment. `best` of each
+    problem is the best proposal of that episode.
 
     Args:
         env: A vector of FitImage-v1, native or not, without other wrappers of
@@ -84,6 +84,7 @@ class Corrections(Wrapper):
                 f"sizes must be divisible by {BLOCK}, got pictures of shape {pictures}"
             )
         mode = AutoresetMode(env.metadata["autoreset_mode"])
+        # that mode hides the last proposal's picture behind the next episode's first
         if mode is AutoresetMode.SAME_STEP:
             raise error.Error("autoreset_mode must be NextStep or Disabled")
         count = env.num_envs
@@ -94,7 +95,7 @@ class Corrections(Wrapper):
         )
         self.observation_space = batch_space(self.single_observation_space, count)
         worlds = env.unwrapped.get_attr("world")  # type: ignore[attr-defined]
-        self._goes_round = worlds[0].yaw == "unknown"
+        self._yaw_wraps = worlds[0].yaw == "unknown"
         self._observed = np.zeros((count, pixels), dtype=np.float32)
         self._best = np.zeros((count, dimensions))
         self._best_drawn = np.zeros((count, pixels), dtype=np.float32)
@@ -130,6 +131,7 @@ class Corrections(Wrapper):
         """
         proposals = self.proposals(np.asarray(actions, dtype=np.float64))
         pictures, rewards, terminated, truncated, infos = self.env.step(proposals)
+        # under NEXT_STEP an ended row begins an episode, and its proposal is not used
         begun = np.asarray(infos["evaluations"]) == 0
         better = (infos["cost"] < self._best_costs) & ~begun
         self._best[better] = proposals[better]
@@ -145,7 +147,7 @@ class Corrections(Wrapper):
         first = np.isinf(self._best_costs)
         reach = np.where(first, 1.0, REACH * 0.5**self._failures)
         proposals = self._best + reach[:, None] * np.clip(actions, -1.0, 1.0)
-        if self._goes_round:
+        if self._yaw_wraps:
             proposals[:, 0] = (proposals[:, 0] + 1.0) % 2.0 - 1.0
         clipped: Array = np.clip(proposals, -1.0, 1.0)
         return clipped
@@ -168,7 +170,7 @@ class Corrections(Wrapper):
 def features(
     observed: Features, drawn: Features, best: Array, first: Flags, failures: Array
 ) -> Features:
-    """Return what an agent sees (n, 2 p + d + 2); see `Corrections`.
+    """Return the observations (n, 2 p + d + 2) of an agent; see `Corrections`.
 
     Args:
         observed: The observed silhouettes (n, p), shrunk.
@@ -187,7 +189,7 @@ def features(
 def shrunk(pictures: Any) -> Features:
     """Return silhouettes (n, height, width, views) as small pictures (n, p).
 
-    A number of them is the mean of 4 x 4 pixels, 0 to 1.
+    Each number is the mean of 4 x 4 pixels, 0 to 1.
     """
     count, height, width, views = pictures.shape
     blocks = pictures.reshape(

@@ -58,6 +58,7 @@ class FitImageSteps:
     def step(self, proposals: Array) -> Array:
         """Return the costs (n,) of proposals (n, d), one in each environment."""
         _, _, ended, infos = self._rows.step(proposals)
+        # a search continues over many episodes, always with the same instance
         if ended.any():
             options = [{"instance": number} for number in self._numbers]
             self._rows.reset(None, options, ended)
@@ -69,7 +70,7 @@ class FitImageSteps:
         The number of proposals need not be a multiple of the number of rows.
         """
         count = self._rows.count
-        # the last step has a proposal in every row: repeat the last one
+        # every row must step, so repeat the last proposal until the last step is full
         filling = np.repeat(proposals[-1:], -len(proposals) % count, axis=0)
         turns = np.concatenate([proposals, filling])
         turns = turns.reshape(-1, count, proposals.shape[1])
@@ -107,7 +108,7 @@ def drive(
     evaluations: int = 2440,
     **settings: Any,
 ) -> Problem:
-    """Return the problem, minimised by stepping `posefit/FitImage-v1`.
+    """Search by stepping `posefit/FitImage-v1`, and return the problem.
 
     A population takes as many steps as it needs. If it does not fill the last step, its
     last proposal is repeated; repeats are not counted. An episode that ends begins
@@ -163,7 +164,7 @@ def drive_each(
     evaluations: int = 2440,
     **settings: Any,
 ) -> list[Problem]:
-    """Return the problem of each environment, minimised by a separate search.
+    """Run a separate search in each environment, and return the problems.
 
     The searches run side by side: each step evaluates one proposal of each. Populations
     may have any size. The seeds are `seed`, `seed` + 1 and so on.
@@ -256,7 +257,8 @@ def track_reference(
         raise error.Error(f"env must be posefit/Track-v1, got {type(bare).__name__}")
     instance = bare.instance
     world = bare.world
-    # the prior has learned from training instances too, so the tracker may
+    # the environment's prior may have learned from this motion; a tracker that is given
+    # training motions must not
     followed = world.motion_of(instance.number) if train else None
     clips = training_clips(train or world.training, followed=followed)
     motions = training_motions(clips, instance.task.fps)

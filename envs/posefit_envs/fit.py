@@ -136,7 +136,7 @@ class FitImageEnv(SearchEnv):
         self.max_evaluations = checked(whole, "max_evaluations", max_evaluations, 1)
         self.action_space, self.observation_space = image_spaces(self.world)
         self.stage = Stage(self.world, 1)
-        self._cost = np.nan  # of the last proposal
+        self._cost = np.nan  # the last proposal's
 
     def begin(self, number: int) -> tuple[Image, Infos]:
         """Begin an episode with an instance: return its first observation and infos."""
@@ -201,7 +201,7 @@ class FitImageVectorEnv(SearchVectorEnv):
         self.set_spaces(*image_spaces(self.world))
         self.stage = Stage(self.world, num_envs, self.threads)
         self._problems = Problems(num_envs, self.world.dimensions)
-        self._costs = np.full(num_envs, np.nan)  # of the last proposals
+        self._costs = np.full(num_envs, np.nan)  # the last proposals'
         self._truths = np.zeros((num_envs, self.world.dimensions))
 
     def begin(self, rows: Rows) -> None:
@@ -210,8 +210,8 @@ class FitImageVectorEnv(SearchVectorEnv):
         for i, number in zip(rows.tolist(), numbers.tolist(), strict=True):
             self._problems.begin(i, partial(first_problem, self.world, number))
             if self.world.shows_truth:
-                # a scene and its truth are made of one instance, which is not cached
-                # for long
+                # the scene and the truth need the same instance, which does not stay
+                # cached for long
                 first_scene(self.world, number)
                 self._truths[i] = first_truth(self.world, number)
         self.stage.set_scenes(rows, first_scenes(self.world, numbers))

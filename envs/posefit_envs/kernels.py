@@ -74,6 +74,7 @@ def align_scenes(chain, scenes, joint_radii, borders, rows, poses, translations)
     many = poses.shape[1]
     block = np.empty(LANES, np.int64)
     lanes = empty_lanes()
+    # joints are placed about a root at the origin, which is then moved
     joints = np.empty((many, joint_radii.shape[1], 3))
     origins = np.zeros((many, 3))
     for i in rows:
@@ -112,8 +113,10 @@ def draw_scenes(chain, scenes, rows, poses, translations, areas, value, pictures
     block = np.empty(LANES, np.int64)
     drawn = np.empty(LANES, np.int64)
     for v in range(views):
-        drawn[:] = -1  # the scene of a lane
+        # the scene that each lane is set up for; -1 for none
+        drawn[:] = -1
         for first in range(0, total, LANES):
+            # the last block may be short: its spare lanes repeat the last pose
             for lane in range(LANES):
                 at = min(first + lane, total - 1)
                 i = rows[at // many]

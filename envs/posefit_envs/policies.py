@@ -24,8 +24,8 @@ def trained_policy(name: str = "fit-image") -> Policy:
     """Return a policy that has learned FitImage-v1; it needs NumPy alone.
 
     Args:
-        name: A file of the folder `trained`, where a card of the same name says what
-            the policy has seen, how well it does, and how it was made.
+        name: The name of a file in the folder `trained`. The card of the same name
+            says what the policy was trained on, how well it does, and how it was made.
 
     Returns:
         The policy. It takes observations of `Corrections`, and returns its actions.
@@ -128,4 +128,5 @@ def race_action(choice: Any, searches: int) -> Array:
 
     A choice is a whole number from 0 to `searches`.
     """
+    # 1 for the choice, and -1 for all others
     return np.asarray(2.0 * np.eye(searches + 1)[np.asarray(choice)] - 1.0)

@@ -42,9 +42,9 @@ SEARCH_FEATURES = 4
 COMMON_FEATURES = 3
 # weight of the latest generation in a slope
 SMOOTHING = 0.2
-# slope observed as 1, in ln(1 + cost) per generation; also a new search's slope
+# the slope that is observed as 1, in ln(1 + cost) per generation; a new search has it
 MAX_SLOPE = 0.1
-# spreads observed as 0 and 1, in half-ranges
+# the spreads that are observed as 0 and 1, in half-ranges
 MIN_SPREAD = 1e-3
 MAX_SPREAD = 1.0
 
@@ -71,6 +71,7 @@ class Races:
         self._factory = checked(registry().optimiser, optimiser)
         sizes = {"population_size": self.population_size}
         names = [setting.name for setting in settings_of(self._factory)]
+        # one more generation than the largest budget: the first population is free
         self._settings = planned(
             self._factory,
             sizes if "population_size" in names else {},
@@ -83,7 +84,8 @@ class Races:
         self.budgets = np.zeros(rows, dtype=np.int64)  # generations
         self.left = np.zeros(rows, dtype=np.int64)
         particles = (rows, self.searches, self.population_size)
-        self.bests = np.zeros((*particles, world.dimensions))  # of each particle
+        # the best proposal of each particle, and its cost
+        self.bests = np.zeros((*particles, world.dimensions))
         self.best_costs = np.full(particles, np.inf)
         self.costs = np.zeros((rows, self.searches))  # the best of each search
         self.slopes = np.zeros((rows, self.searches))
@@ -113,7 +115,7 @@ class Races:
     def _begin_search(self, row: int, search: int) -> None:
         """Replace one of a race's searches by a new one."""
         space = self.stage.space(row)
-        # a separate generator: what one search draws changes no other
+        # a separate generator, so that the draws of one search do not affect the others
         rng = np.random.default_rng(int(self._rngs[row].integers(2**63)))
         self._optimisers[row][search] = checked(
             lambda: self._factory(space, rng, **self._settings)
@@ -148,6 +150,7 @@ class Races:
         """Run one generation of the chosen search (m,) of some races (m,)."""
         pairs = list(zip(rows.tolist(), chosen.tolist(), strict=True))
         count = self.population_size
+        # the stage takes a population for every race; those left out remain 0
         proposals = np.zeros((len(self.problems), count, self.world.dimensions))
         for row, search in pairs:
             population = self._optimisers[row][search].ask()
@@ -159,6 +162,7 @@ class Races:
             proposals[row] = population
         costs = self.stage.costs(proposals, rows)
         self.problems.count(rows, proposals[rows], costs[rows])
+        # copies, because an optimiser may keep or change what it is told
         for row, search in pairs:
             costs_of_search = costs[row].copy()
             self._optimisers[row][search].tell(proposals[row].copy(), costs_of_search)
@@ -179,6 +183,7 @@ class Races:
         bests[better] = proposals[better]
         best_costs[better] = costs[better]
         after = best_costs.min(axis=1)
+        # a search without an earlier cost has no fall yet, and keeps the first slope
         falls = log_improvement(np.where(searched, before, after), after)
         slopes = self.slopes[at] + SMOOTHING * (falls - self.slopes[at])
         self.bests[at] = bests
@@ -191,7 +196,7 @@ class Races:
     def observations(self) -> NDArray[np.float32]:
         """Return the features (n, 4 searches + 3) of the races."""
         budgets = self.budgets[:, None]
-        # spreads shrink by factors, so that their logarithm is the even scale
+        # a search shrinks by factors, so the scale of spreads is logarithmic
         widths = np.maximum(self.spreads / MIN_SPREAD, 1.0)
         features = [
             log_cost(self.costs),
@@ -329,7 +334,7 @@ class RaceEnv(SearchEnv):
 
     def begin(self, number: int) -> tuple[Any, Infos]:
         """Begin an episode with an instance: return its first observation and infos."""
-        # one number of the environment's generator, however much the race will draw
+        # only one draw from the environment's generator, however many a race needs
         self.races.begin(0, number, int(self.np_random.integers(2**63)))
         self.races.evaluate_first(np.array([0]))
         return self.races.observations()[0], self._infos()

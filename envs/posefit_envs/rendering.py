@@ -13,7 +13,7 @@ from posefit.silhouette.cost import project
 
 MODES = ("rgb_array",)  # Gymnasium shows the pictures of "human" in its own window
 HEIGHT = 240  # pixels
-STRIP = 30  # pixels for the words below
+STRIP = 30  # pixels of the strip below the picture, for the label
 
 Picture = NDArray[np.uint8]  # (height, width, 3) red, green, blue
 
@@ -39,7 +39,7 @@ def render_frame(
     Args:
         cost: The cost function of the frame.
         proposed: A pose (66,) and its translation (3,), or None.
-        label: The words below the picture.
+        label: The text below the picture.
     """
     panels = []
     for camera, silhouette in zip(cost.cameras, cost.silhouettes, strict=True):

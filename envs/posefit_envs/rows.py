@@ -67,7 +67,7 @@ class VectorRows:
         # the observations and infos of the last step; a row that ended under SAME_STEP
         # already shows its new episode
         self.begun: tuple[Any, list[Infos]] = None, []
-        # which rows of the last step were cut short
+        # which rows the last step truncated
         self.truncated = np.zeros(self.count, dtype=bool)
 
     def reset(
@@ -85,6 +85,7 @@ class VectorRows:
         waiting = np.ones(self.count, dtype=bool) if mask is None else mask.copy()
         infos: list[Infos] = [{} for _ in range(self.count)]
         observations = None
+        # a reset has one set of options, so rows with equal options are reset together
         while waiting.any():
             first = options[int(np.flatnonzero(waiting)[0])]
             alike = waiting & np.array([one == first for one in options])
@@ -104,8 +105,8 @@ class VectorRows:
         """Step all rows; return observations, rewards, which episodes ended, and infos.
 
         Observations and infos of a row whose episode has ended are the episode's last.
-        Reset the row before the next step, in every autoreset mode. Under SAME_STEP it
-        has also begun again: see `begun`.
+        Reset the row before the next step, in every autoreset mode. Under SAME_STEP
+        its next episode has begun already: see `begun`.
         """
         observations, rewards, terminated, truncated, rows = self._vector.step(actions)
         ended = terminated | truncated

@@ -113,6 +113,7 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
         def get_images(self) -> Sequence[Any]:
             return list(vector.render() or [None] * self.num_envs)
 
+        # the wrapped vector sets and calls for all environments at once
         def _check_all(self, indices: Any) -> None:
             chosen = sorted(set(self._get_indices(indices)))
             if chosen != list(range(self.num_envs)):

@@ -287,12 +287,12 @@ class Stage:
         Each shows the body that was rasterised last in its row.
         """
         shown = rows[self._has_body[rows]]
-        # most pictures are of a reset: then nothing is to be drawn
+        # after a reset, the usual case, there is no body to draw
         if len(shown) == 0:
             observed = self._backdrops[rows]
             return observed.view(np.uint8)
         pictures = self._backdrops.copy()
-        # to draw a body again is not an evaluation
+        # redrawing a body is not an evaluation
         with uncounted():
             self._drawn(
                 self._poses[:, None], self._translations[:, None], shown, pictures
@@ -350,6 +350,7 @@ class Stage:
             latents,
         )
         assert finite, "actions are checked, and spaces are finite"
+        # one call for the latents of all scenes, which is faster than one for each
         angles = self._prior.inverse_transform(latents.reshape(n * k, -1))
         poses[..., 3:] = angles.reshape(n, k, -1)
         if self._translation == "aligned":

@@ -91,8 +91,8 @@ class TrackEnv(SearchEnv):
 
     ## Information
     A step and a reset give `cost`, `best_cost`, `evaluations` of the frame,
-    `remaining_steps` of the episode, `areas` (views, 3), `frame`, and `instance`; and
-    of the pose that the step commits `committed_frame`, `committed_cost` and
+    `remaining_steps` of the episode, `areas` (views, 3), `frame`, and `instance`. For
+    the pose that the step commits they give `committed_frame`, `committed_cost` and
     `committed_pose` (66,). A step that commits nothing has -1, infinity and zeros.
     After a step that commits, `frame` is the next frame.
 
@@ -126,7 +126,7 @@ class TrackEnv(SearchEnv):
         )
         self.action_space, self.observation_space = image_spaces(self.world)
         self.stage = Stage(self.world, 1)
-        self._cost = np.nan  # of the last proposal
+        self._cost = np.nan  # the last proposal's
 
     def begin(self, number: int) -> tuple[Image, Infos]:
         """Begin an episode with an instance: return its first observation and infos."""
@@ -156,7 +156,7 @@ class TrackEnv(SearchEnv):
         observation = drawn.pictures[0]
         reward = float(reward_of_cost(self._cost))
         infos = row_of(proposal_infos(self.stage, drawn, self.world.shows_truth), 0)
-        # before a pose is committed: the counts are of the frame of the proposal
+        # count before a pose is committed: the counts belong to the proposal's frame
         self._count(infos)
         committed = nothing_committed(self.world)
         if not problem.remaining_evaluations:
@@ -198,7 +198,7 @@ class TrackEnv(SearchEnv):
         infos["instance"] = self.number
 
     def _frame(self) -> int:
-        # past the last frame, the last frame
+        # after the last commit, the last frame
         return min(self._sequence.frame, self.frames - 1)
 
     @property
@@ -241,7 +241,7 @@ class TrackVectorEnv(SearchVectorEnv):
         self.stage = Stage(self.world, num_envs, self.threads)
         self._problems = Problems(num_envs, self.world.dimensions)
         self._sequences: dict[int, Sequence] = {}
-        self._costs = np.full(num_envs, np.nan)  # of the last proposals
+        self._costs = np.full(num_envs, np.nan)  # the last proposals'
 
     def begin(self, rows: Rows) -> None:
         """Begin episodes in some environments, with the instances of `numbers`."""
@@ -279,7 +279,7 @@ class TrackVectorEnv(SearchVectorEnv):
         self._costs = drawn.costs
         rewards = reward_of_cost(drawn.costs)
         infos = proposal_infos(self.stage, drawn, self.world.shows_truth)
-        # before poses are committed: the counts are of the frames of the proposals
+        # count before poses are committed: the counts belong to the proposals' frames
         self._count(infos)
         full = stepping & (problems.evaluations >= self.evaluations_per_frame)
         terminated, committed = self._commit(np.flatnonzero(full), drawn.pictures)
@@ -337,7 +337,7 @@ class TrackVectorEnv(SearchVectorEnv):
 
     def _frames(self) -> Rows:
         """Return the current frame (n,) of each environment."""
-        # past the last frame, the last frame
+        # after the last commit, the last frame
         frames = [self._sequences[i].frame for i in range(self.num_envs)]
         return np.minimum(frames, self.frames - 1)
 

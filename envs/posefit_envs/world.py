@@ -60,10 +60,10 @@ YAW_DEGREES = 20.0
 ANY_YAW_DEGREES = (180.0, *ROOT_RANGE_DEGREES[1:])
 # largest difference between the middle of the searched translation and the truth
 MIDDLE_METRES = 0.25
-# from the camera to the person, and of the camera above the ground
+# the camera's distance from the person, and its height above the ground
 DISTANCE = 3.5  # metres
 HEIGHT = 0.9
-# the byte that shows the body, of a pixel's two
+# a pixel has two bytes, viewed as one number: these are the bits of the body's byte
 BODY = 0xFF00 if sys.byteorder == "little" else 0x00FF
 OBSERVED = 0xFFFF ^ BODY
 
@@ -104,7 +104,7 @@ class World:
 
     @cached_property
     def default_infos(self) -> "World":
-        """The same world with the default infos, on which no scene depends."""
+        """The same world with default infos, which do not affect scenes."""
         return replace(self, errors=True, evaluate=False)
 
     @cached_property
@@ -131,7 +131,7 @@ class World:
             # only built-in motions have styles; for any other, learn from walks
             name = motion if motion in built_in.names() else "walk"
             styles += built_in.other_styles(name)
-        # two styles of one kind would bring their common styles twice
+        # two styles of one kind have other styles in common: list each only once
         return tuple(dict.fromkeys(styles))
 
     @property
@@ -198,7 +198,7 @@ def world_of(own: Sequence[str] = (), /, **arguments: Any) -> World:
     for name in arguments:
         if name not in known:
             every = *known, *own
-            # Python's own words, by which TorchRL knows what to leave out
+            # Python's wording, in which TorchRL recognises an argument to leave out
             raise TypeError(
                 f"unexpected keyword argument {quoted(name)}"
                 f"{suggestion(name, every)}: it must be one of {', '.join(every)}"
@@ -274,7 +274,7 @@ def _motions(motion: Any, held_out_people: bool) -> tuple[str, ...]:
         names = motion
     if not isinstance(names, Sequence) or not names or not _are_texts(names):
         raise ArgumentError(
-            f"motion must be a name, several, or 'all', got {quoted(motion)}"
+            f"motion must be a name, several names, or 'all', got {quoted(motion)}"
         )
     if held_out_people:
         for name in names:
@@ -302,7 +302,7 @@ def _views(view_degrees: Any) -> tuple[float, ...]:
         views = []
     if not views:
         raise ArgumentError(
-            "view_degrees must be a finite number or several, "
+            "view_degrees must be one finite number or several, "
             f"got {quoted(view_degrees)}"
         )
     return tuple(views)
@@ -345,7 +345,7 @@ def _learned(prior: str, motion: str, train: tuple[str, ...]) -> Prior:
     skeleton = _source(motion).skeleton
     angles_of_motions = []
     for name in train:
-        # joint angles compare only about the axes of one skeleton
+        # joint angles are comparable only if they are about the axes of one skeleton
         own = load_motion(name, FPS).about_axes_of(skeleton)
         angles_of_motions.append(own.poses[:, 3:])
     angles = np.concatenate(angles_of_motions)  # (T, 63)

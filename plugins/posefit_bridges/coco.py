@@ -20,7 +20,7 @@ from posefit.suites.registry import STANDARD_INSTANCES
 # COCO's figures show six dimensions at most, and compare two of these in detail
 SHOWN_DIMENSIONS = DIMENSIONS[:-1]
 COMPARED_DIMENSIONS = (9, 20)
-# cocopp keeps the evaluations to costs of 10 to the k / POINTS, for whole numbers k.
+# cocopp keeps the evaluations until each cost 10^(k / POINTS), with whole numbers k.
 # The suite's targets are of that form, because they are powers of the fourth root of 2.
 POINTS = 4.0 / math.log10(2.0)
 

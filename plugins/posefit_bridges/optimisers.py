@@ -77,7 +77,7 @@ class Bridge(Adapter):
         super().__init__(space, draw_population(space, rng, 1)[0])
         self._library = library
         self._seed = int(rng.integers(2**63))
-        # of all populations so far
+        # the costs of all populations so far
         self._costs: list[Array] = []
         self._begin()
 
@@ -447,5 +447,5 @@ def called_back(
             answers.put((yield population))
     finally:
         answers.put(None)
-        if not sys.is_finalizing():  # else the thread is gone already
+        if not sys.is_finalizing():  # while Python ends, the thread is gone already
             thread.join(LEAVE_SECONDS)

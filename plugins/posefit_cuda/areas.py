@@ -33,7 +33,7 @@ def areas_on_device(
 ) -> Areas:
     """Return R, B, Y (n, 3) in pixels of poses (n, 66) at translations (n, 3).
 
-    The device counts. The callers check shapes.
+    The areas are counted on the device. Callers check the shapes.
     """
     out = np.empty((len(poses), 3), dtype=np.int64)
     drawing = drawing_on_device(body, camera, silhouette)

@@ -45,4 +45,4 @@ def _missing() -> str | None:
         return f"numba-cuda cannot be imported: {error}"
     if cuda.is_available():
         return None
-    return "no driver of NVIDIA's that answers, or no GPU"
+    return "no working NVIDIA driver, or no GPU"

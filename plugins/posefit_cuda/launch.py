@@ -19,7 +19,7 @@ from posefit.silhouette.rasteriser import FAR, FLAT, HUGE, NEAR, ONE, WINDOW, ZE
 from posefit.silhouette.spans import BLOCK
 from posefit.silhouette.spans import STRIP_PIXELS as STRIP
 
-THREADS = 64  # of a block
+THREADS = 64  # threads of a block
 WORDS = 4  # words of a row that a thread fills together
 _ANGLES = ANGLES
 _BONES = len(BONES)
@@ -363,16 +363,16 @@ def count_on_device(chain, radii, view, size, observed, poses, translations, are
     """Write the areas R, B, Y of poses, one pose per block.
 
     Args:
-        chain: A `Chain`.
-        radii: (26, 2) metres.
-        view: (16,): rotation, translation, focal lengths, centre.
+        chain: The skeleton, a `Chain`.
+        radii: Radii (26, 2) of the bones' cones, in metres.
+        view: Rotation, translation, focal lengths and centre in one array (16,).
         size: Width and height in pixels.
         observed: The bit images (strips, rows) of the person and of valid pixels, as
             32-bit words in the layout of `rasteriser`, and the number of the person's
             pixels (1,).
-        poses: (n, 66).
-        translations: (n, 3) metres.
-        areas: (n, 3), the output.
+        poses: The poses (n, 66).
+        translations: The positions (n, 3) of their roots, in metres.
+        areas: The areas (n, 3) in pixels, which are written.
     """
     width, height = size
     person, valid, pixels = observed
@@ -391,11 +391,13 @@ def count_on_device(chain, radii, view, size, observed, poses, translations, are
     threads = cuda.blockDim.x
     strips = person.shape[0]
 
+    # after each step the threads wait, because the next one reads what all have written
     for a in range(thread, _ANGLES, threads):
         write_sine(a, poses[i, a], sines, cosines)
     if thread == 0:
         counts[0] = 0
         counts[1] = 0
+        # an empty box, which `bound` widens
         box[0] = height
         box[1] = 0
         box[2] = strips
@@ -412,6 +414,7 @@ def count_on_device(chain, radii, view, size, observed, poses, translations, are
         write_cone(b, starts[b], radii, ends, (strips, width, height), lines, bounds)
         bound(b, bounds, box)
     cuda.syncthreads()
+    # only the part of the picture that the body can cover
     rows = max(box[1] - box[0], 0)
     across = (box[3] - box[2]) // WORDS + 1
     for item in range(thread, rows * across, threads):

@@ -157,13 +157,13 @@ def _centres_of(latents_bytes: bytes, m: int, clusters: int) -> Array:
 
 def _k_means(latents: Array, clusters: int) -> Array:
     """Return the centres (K, m) of the best of several runs of K-means."""
-    # gives the same as scikit-learn, whose import takes two seconds
+    # SciPy gives the same as scikit-learn, whose import takes two seconds
     from scipy.cluster.vq import kmeans2
 
     count = min(clusters, len(np.unique(latents, axis=0)))
     rng = np.random.default_rng(CLUSTERING_SEED)
     with warnings.catch_warnings():
-        # warns of runs in which a cluster becomes empty; they are not the best
+        # SciPy warns of runs in which a cluster becomes empty; these are not the best
         warnings.simplefilter("ignore")
         runs = [
             kmeans2(latents, count, CLUSTERING_ROUNDS, minit="++", rng=rng)

@@ -28,7 +28,7 @@ VARIANTS = (
     "MiniBatchDictionaryLearning", "MiniBatchSparsePCA", "PCA", "SparsePCA",
     "TruncatedSVD",
 )  # fmt: skip
-# largest number of poses for KernelPCA, which needs the square of it in memory
+# largest number of poses for KernelPCA, whose memory grows with its square
 KERNEL_POSES = 5_000
 DEFAULTS: dict[str, dict[str, Any]] = {
     "KernelPCA": {"kernel": "rbf", "gamma": 0.2, "fit_inverse_transform": True}
@@ -38,8 +38,8 @@ DEFAULTS: dict[str, dict[str, Any]] = {
 class Transformed:
     """The space of a scikit-learn transformer, with constraints 1 and 2 on its latents.
 
-    A linear transformer is inverted by our own loop. Any other is inverted row by row,
-    about 100 us each, because a row must always give the same bits.
+    A linear transformer is inverted by posefit's own loop. Any other is inverted row by
+    row, about 100 us each, because a row must always give the same bits.
 
     Settings:
         variant: The class, such as KernelPCA; `sklearn:NAME` sets it.
@@ -160,7 +160,7 @@ def _linear(model: Any, components: int) -> tuple[Array, Array] | None:
         ) from None
     if images.shape != (len(probe), 63):
         raise InputError(
-            "variant must give back 63 angles, "
+            "variant must have an inverse to 63 angles, "
             f"got {images.shape[1:]} from {type(model).__name__}"
         )
     matrix = images[1:-1] - images[0]

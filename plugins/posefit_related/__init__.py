@@ -1,6 +1,6 @@
-"""The methods with which the SAPSO paper compares, from their publications.
+"""The methods to which the SAPSO paper compares its own, from their publications.
 
-They run on posefit's masks and budget.
+They get posefit's masks and budgets.
 
 - `hpso.HPSO`: a swarm that searches the kinematic chain part by part (John, Trucco and
   Ivekovic, 2010).

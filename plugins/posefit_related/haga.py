@@ -41,7 +41,7 @@ class HAGA:
     """A genetic search in layers of more and more coordinates, each annealed.
 
     Settings:
-        population_size: 2 or more.
+        population_size: Number of individuals, 2 or more.
         layers: Number of layers of coordinates, 1 or more.
         evaluations: Budget of a frame, shared among the layers, 1 or more. Ours: as
             many as SAPSO's.

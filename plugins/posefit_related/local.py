@@ -140,5 +140,5 @@ class Local:
         self._push(self._best_cost, self._best)
 
     def _push(self, cost: float, pose: Array) -> None:
-        self._count += 1  # of equal costs, the first pose is taken
+        self._count += 1  # orders poses of equal cost by age
         heappush(self._open, (cost, self._count, pose))

@@ -76,6 +76,7 @@ class Smoothing:
         sequence = list(observations)
         states = list[Array]()
         weights = list[Array]()
+        # one evaluation of a frame is left for the pose that is reported
         count = max(self.task.evaluations - 1, 1)
         poses = first_poses(self.task, rng, count)
         where = np.tile(self.task.anchor, (count, 1))
@@ -105,6 +106,7 @@ class Smoothing:
         for observation, particles, weight in zip(
             sequence, states, weights, strict=True
         ):
+            # a mean of differences from one particle, because yaws wrap around
             leading = particles[weight.argmax()]
             mean = leading + weight @ differences(particles, leading)
             evaluations = count if observation.usable else 0

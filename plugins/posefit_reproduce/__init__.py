@@ -9,10 +9,10 @@
 Other measurements are scripts in the repository's folder `docs/studies`.
 
     commands.py     the command lines
-        experiment.py   what both share: stored runs; tables, claims and figures from
-        them
-        sapso/, vsmm/   the experiments; `sapso/letter.py` is an optimiser,
-        `sapso-letter`
+        experiment.py   what both share: stored runs, from which tables, claims and
+                        figures are made
+        sapso/, vsmm/   the experiments; `sapso/letter.py` has the optimiser
+                        `sapso-letter`
         bench/          the benchmark
         jobs.py         runs jobs in the worker processes of `posefit sweep`
 """

@@ -6,7 +6,7 @@ output; a command imports the rest when it runs.
 
 from collections.abc import Iterator, Mapping
 from functools import partial
-from importlib import import_module  # of figures, for which matplotlib may be missing
+from importlib import import_module  # for figures: matplotlib may be missing
 from typing import TYPE_CHECKING, Any
 
 import click

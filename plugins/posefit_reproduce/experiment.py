@@ -40,7 +40,7 @@ Verdict = Literal["holds", "fails", "not decided"]
 class Run(NamedTuple):
     """Identifies a run."""
 
-    kind: str  # of the experiment
+    kind: str  # one kind of an experiment's runs, such as "track"
     subject: str  # the motion or film
     method: str
     view: float = 0.0  # degrees

@@ -14,9 +14,9 @@ Array = NDArray[np.float64]
 Bits = NDArray[np.uint64]  # 64 pixels a number
 
 if "NUMBA_CPU_NAME" in os.environ:
-    # A named processor must have only its own instructions. numba, which is not
-    # imported yet, uses the name only to schedule instructions: x86-64-v3 would still
-    # have AVX-512 on a machine that has it.
+    # Code for a named processor must use only that processor's instructions. numba,
+    # which is not imported yet, uses the name only to schedule instructions: code for
+    # x86-64-v3 would still use AVX-512 on a machine that has it.
     os.environ.setdefault("NUMBA_CPU_FEATURES", "")
 
 

@@ -124,8 +124,8 @@ def compiling_seconds() -> float:
 def state_of(module: str) -> str:
     """Return a module's name with a digest of everything that its functions depend on.
 
-    That is the module's source, the constants that it imports, and the same for the
-    modules that it imports, by themselves or a function of theirs.
+    That is the module's source, the constants that it imports, and the same for
+    every module that it imports, or imports a function from.
     """
     digest = hashlib.sha256(numba.__version__.encode())
     modules = [module]

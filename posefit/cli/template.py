@@ -38,12 +38,12 @@ def write_plugin(
     one_of("kind", kind, (*CHECKED_KINDS, COMMAND))
     if not re.fullmatch(r"[a-z][a-z0-9]*([-_][a-z0-9]+)*", name):
         raise InputError(
-            "name must be small letters, digits, - and _, and begin with a letter, "
-            f"got {quoted(name)}"
+            "name must be lower-case letters, digits, - and _, and begin with a letter"
+            f", got {quoted(name)}"
         )
     if name in (known := _taken(kind, commands)):
         raise InputError(
-            f"name must be new, got {name!r}, which {known[name]} registers already"
+            f"name must be new, got {name!r}, which {known[name]} already registers"
         )
     module = name.replace("-", "_")
     # an installed module of that name would be imported instead, or be hidden

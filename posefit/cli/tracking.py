@@ -144,7 +144,7 @@ def _track_live(
     frames = track_live(live, progress=shown, **chosen)
     each = (lambda frame: click.echo(json.dumps(frame.row))) if as_json else None
     summary = write_live(frames, out, each)
-    # as after Ctrl-C before the first pose
+    # the stream may end, or Ctrl-C be pressed, before the first pose
     if not summary["frames"]:
         shown.log("no frame was tracked")
         return

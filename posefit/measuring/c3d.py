@@ -52,6 +52,9 @@ def write_c3d(
         parameters = _section(_parameters(motion, start, gait))
     first = min(motion.first + 1, MAX_FRAMES)
     last = min(motion.first + len(motion), MAX_FRAMES)
+    # the parameters' first block and the key; points and analog values of a frame;
+    # first and last frame; the longest gap to fill; the scale, negative for real
+    # numbers; the first block of the points; analog samples of a frame; the rate
     header = struct.pack(
         "<BBHHHHHfHHf",
         2,

@@ -23,9 +23,9 @@ from posefit.measuring.segments import SIDES
 from posefit.motion.motion import Motion, at_frames
 from posefit.motion.steadiness import runs
 
-STEP_SECONDS = (0.33, 1.3)  # of a walk: 46 to 180 steps per minute
+STEP_SECONDS = (0.33, 1.3)  # a step of a walk: 46 to 180 steps per minute
 MIN_SPEED = 0.2  # metres per second
-MIN_STEPS = 2  # of a walk
+MIN_STEPS = 2  # fewest steps of a walk
 MIN_STEPS_SHARE = 1.0 / 3.0  # least share of the known time that the steps last
 # metres between the lines on which the feet of a walk strike; in dancing or dodging it
 # is wider
@@ -33,7 +33,8 @@ MAX_STEP_WIDTH = 0.35
 RUNNING_FROUDE = 0.5  # the Froude number above which people run rather than walk
 # share of a stride; judged by the rearmost toes, a runner's stance is shorter
 MIN_STANCE_SHARE = 0.57
-# ours: standard deviation over mean of strides in one place; a dance's differ more
+# ours: standard deviation of strides in one place over their mean; in a dance it is
+# larger
 MAX_UNEVEN = 0.1
 # ours: greater than MIN_STEPS_SHARE, because other motions are in one place, too
 MIN_STEPS_SHARE_IN_PLACE = 0.5
@@ -59,10 +60,11 @@ class Step:
         strike_seconds: Time of the strike.
         toe_off_seconds: Time of the next toe off.
         step_seconds: Duration of the step.
-        step_length: From the other ankle at its strike, along the way the person faces.
-        step_width: Between both ankles at the strike, across the way.
+        step_length: Distance from the other ankle at its strike, in the direction that
+            the person faces.
+        step_width: Distance between the ankles at the strike, across that direction.
         stride_seconds: Duration of the stride.
-        stride_length: From this strike to the foot's next one.
+        stride_length: Distance from this strike to the foot's next one.
         stance_share: Share of the stride in which the foot is on the ground.
     """
 
@@ -106,10 +108,10 @@ class Gait:
         right: Means of the right foot.
         cadence: Steps per minute.
         speed: Metres per second.
-        step_length: metres.
-        stride_length: metres.
-        step_width: metres.
-        stance_share: Share of a stride.
+        step_length: Mean length of a step, in metres.
+        stride_length: Mean length of a stride, in metres.
+        step_width: Mean width of a step, in metres.
+        stance_share: Mean share of a stride in which the foot is on the ground.
     """
 
     steps: list[Step] = field(default_factory=list, repr=False)

@@ -29,10 +29,10 @@ from posefit.motion.motion import LONGEST, Motion
 from posefit.reading import check_size, quoted
 
 FPS = 120.0  # CMU's rate; its files do not state it
-RATE = re.compile(r"#\s*(\S{1,40}) frames a second")  # in posefit's own files
+RATE = re.compile(r"#\s*(\S{1,40}) frames a second")  # posefit writes it
 SIZE_LIMIT = 500_000_000  # bytes
 LONGEST_LINE = 10_000  # bytes; the root's line has about 60
-LEAST = 0.5  # a file whose angles are all smaller than this is of a rest pose
+MIN_DEGREES = 0.5  # if all angles of a file are smaller, it shows a rest pose
 VALUES = 20_000_000  # numbers in a file: 200,000 frames of 100 channels
 
 Spans = dict[str, tuple[int, int]]  # bone: start and stop of its values in a frame
@@ -104,7 +104,7 @@ def read_amc(
     if first > 1:
         from_0 = "here its frames are numbered from 0"
         notes = (*notes, f"{path}: the file's first frame is number {first}: {from_0}")
-    # of the joints, because a root may make many turns
+    # only joints are doubted, because a root may make many turns
     if said := doubtful_angles(values[:, 6:], radians=radians):
         notes = (*notes, f"{path}: {said}")
     angles = values if radians else np.deg2rad(values)
@@ -132,7 +132,7 @@ def doubtful_angles(angles: Array, *, radians: bool) -> str:
     largest = float(np.abs(angles).max(initial=0.0))
     if radians and largest > FULL_TURN:
         return f"angles of up to {largest:.4g} radians seem to be degrees"
-    if not radians and LEAST < largest <= FULL_TURN:
+    if not radians and MIN_DEGREES < largest <= FULL_TURN:
         return f"angles of at most {largest:.3g} degrees may be radians"
     return ""
 

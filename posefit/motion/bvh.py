@@ -71,7 +71,8 @@ USUAL_RATES = (
     (24, 25, 30, 48, 50, 60, 72, 90, 100, 120, 144, 150, 180, 200, 240, 250, 300),
     tuple(whole * 1000.0 / 1001.0 for whole in (24, 30, 60, 120, 240)),
 )
-MISSED = 1e-3  # metres that a joint may be off its place in the file without a note
+# metres that a joint may be off its place in the file without a note
+MAX_JOINT_OFF = 1e-3
 
 
 def read_bvh(
@@ -152,7 +153,7 @@ def read_bvh(
             f"{path}: the file lacks {', '.join(result.filled)}; "
             "an average person's are added, at rest"
         )
-    if result.off * metres > MISSED:
+    if result.off * metres > MAX_JOINT_OFF:
         off = f"{1e3 * result.off * metres:.1f} mm off"
         notes.append(
             f"{path}: bones change their length or fork, so joints are up to {off}"

@@ -20,7 +20,7 @@ from posefit.motion.bvh import read_bvh
 from posefit.motion.motion import Motion
 from posefit.reading import existing, quoted
 
-FPS = 30.0  # of motions and masks that state no rate
+FPS = 30.0  # rate of motions and masks that state none
 MOTIONS = (".amc", ".bvh")
 # memory for each pose that a method learns from: angles, joints, codes, and copies
 POSE_BYTES = 3_000
@@ -232,6 +232,8 @@ def _check_memory(poses: int, fps: float, most: int) -> None:
 def _clips(
     source: Source, stated: FileOptions, followed: Source | None
 ) -> Iterator[SourceClip]:
+    # the followed motion is left out of the library and of folders without a word; to
+    # name it is a mistake
     if isinstance(source, str) and recorded.is_library(source):
         stem = _stem(followed)
         clips = [clip for clip in recorded.named(source) if clip.name != stem]

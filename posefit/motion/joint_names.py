@@ -92,7 +92,7 @@ def part_of(name: str) -> Part:
             side, letter = _JOINED[word]
             sides.append(side)
             rest.append(letter)
-        # a side's letter before the part, such as lThigh in small letters or lfemur
+        # a side's letter before the part, such as lThigh in lower case, or lfemur
         elif word not in _KNOWN and word[0] in "lr" and word[1:] in _KNOWN:
             sides.append(_SIDES[word[0]])
             rest.append(word[1:])

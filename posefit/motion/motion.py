@@ -28,7 +28,7 @@ class Motion:
     """Poses of one skeleton at a constant rate. Arrays are read-only copies.
 
     Attributes:
-        name: Of the clip.
+        name: The name of the clip.
         skeleton: The skeleton that the poses are of.
         poses: Angles (T, 66) in radians, unwrapped along time by the readers.
         translations: Root joint (T, 3) in the world, in metres.

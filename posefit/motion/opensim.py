@@ -182,12 +182,12 @@ def _joint(
     """Return a joint between a parent's frame and a body's origin.
 
     Args:
-        joints: Where to add it.
+        joints: The element to which the joint is added.
         kind: OpenSim's kind of joint.
-        name: Of the body.
+        name: The name of the body.
         parent: Path of the parent's frame.
-        at: Where in the parent's frame it is (3,).
-        axes: Axes (3, 3) of its angles.
+        at: The joint's position (3,) in the parent's frame.
+        axes: Axes (3, 3) of the joint's angles.
     """
     joint = SubElement(joints, kind, name=f"{name}_joint")
     SubElement(joint, "socket_parent_frame").text = f"{name}_parent"
@@ -212,7 +212,7 @@ def _mobile(
         turns: Names of its turns, the outermost first; "" for a fixed axis.
         axes: Axes (3, 3) of the turns.
         moves: Names of its translations along x, y, z; "" for a fixed axis.
-        skeleton: Has the limits of the angles.
+        skeleton: The skeleton, which has the limits of the angles.
     """
     listed = SubElement(joint, "coordinates")
     for name in (*turns, *moves):

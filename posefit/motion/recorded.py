@@ -45,8 +45,8 @@ class RecordedClip:
 
     Attributes:
         name: Subject and clip, such as 16_15.
-        subject: The person.
-        skeleton: Of the person.
+        subject: The person's number in the CMU database.
+        skeleton: The skeleton of the person.
         steps: Stored whole numbers (K, 69), of angles and of the root joint.
         times: Frames (K,) since the first pose, at 30 frames per second.
     """

@@ -49,7 +49,7 @@ SQUARE = 25.0  # degrees within which a root's axes are snapped to left, up and 
 STANDING = 0.7  # least mean cosine between legs, trunk and the axis that is up
 POSES = 2_000  # most frames that are searched for one like the rest pose
 # radians: a turn below this about an axis that CMU's joints lack is a rounding error
-UNUSED = 1e-5
+MIN_TURN = 1e-5
 _ENDS_OF = {
     "hipjoint": "thigh",
     "femur": "shin",
@@ -74,8 +74,8 @@ class Rig:
     """A tree with a person's joints, at rest and in motion.
 
     Attributes:
-        names: Of the nodes, "" for the end of a bone without a further joint.
-        parents: Of the nodes, -1 for a root.
+        names: Names of the nodes, "" for the end of a bone without a further joint.
+        parents: Parents of the nodes, -1 for a root.
         joints: Which nodes are the person's joints.
         rest: Turns (nodes, 3, 3) and places (nodes, 3) at rest.
         moving: Turns (nodes, T, 3, 3) and places (nodes, T, 3) in the frames.
@@ -144,11 +144,11 @@ class Retargeted:
     """A rig's motion, converted to a `Skeleton`, in the rig's unit.
 
     Attributes:
-        skeleton: With the rig's bones.
-        poses: Angles (T, 66).
-        places: Root joint (T, 3).
+        skeleton: A skeleton with the rig's bones.
+        poses: Poses (T, 66).
+        places: Positions (T, 3) of the root joint.
         filled: Names of the bones that the rig does not have.
-        off: Greatest distance of a joint from its place in the rig.
+        off: The greatest distance of a joint from its place in the rig.
     """
 
     skeleton: Skeleton
@@ -189,8 +189,8 @@ class _Rest(NamedTuple):
 
     Attributes:
         own: Whether it is the rig's own rest pose.
-        turns: Of the nodes (nodes, 3, 3).
-        places: Of the nodes (nodes, 3).
+        turns: Turns of the nodes (nodes, 3, 3).
+        places: Places of the nodes (nodes, 3).
         root: Left, up and ahead as columns (3, 3), in the root's node.
     """
 
@@ -347,10 +347,10 @@ def _aim(
     """Turn a carrier (T, 3, 3) so that a bone reaches its end; return its length.
 
     Args:
-        carrier: Turned in place.
-        direction: Of the bone in the carrier (3,).
-        length: Of the bone.
-        reach: From the bone's start to its wanted end (T, 3).
+        carrier: Turns of the carrier; changed in place.
+        direction: Direction of the bone in the carrier (3,).
+        length: Length of the bone.
+        reach: Vectors from the bone's start to its wanted end (T, 3).
         near: Distance below which nothing is changed.
     """
     distances = np.linalg.norm(reach, axis=1)
@@ -394,7 +394,7 @@ def _skeleton(offsets: Array, poses: Array, average: Skeleton) -> Skeleton:
     A joint that turns about another axis, too, gets all three.
     """
     # (66,) whether there is a turn about an axis that CMU's joints lack
-    beyond = (np.abs(poses) > UNUSED).any(axis=0) & ~average.free
+    beyond = (np.abs(poses) > MIN_TURN).any(axis=0) & ~average.free
     used = []
     for joint in INNER:
         angle = angle_index(joint)
@@ -559,9 +559,11 @@ def _like_rest(rig: Rig, bones: Sequence[_Bone]) -> _Rest:
 
     legs = (("thigh", "shin", "femur"), ("shin", "foot", "tibia"))
     arms = (("arm", "forearm", "humerus"), ("forearm", "hand", "radius"))
+    # the legs alone decide, because rest poses hold the arms in many ways
     own = pose(True, *rig.rest)
     if degrees_off(own, legs).max() <= UPRIGHT:
         return own
+    # frames of a long file are sampled; the rest pose may still be the best
     count = rig.moving[0].shape[1]
     frames = range(0, count, max(1, count // POSES))
     poses = [own]

@@ -20,8 +20,8 @@ from posefit.silhouette.rasteriser import NEAR
 BACKGROUND = (28, 24, 22)
 # the areas Y, R and B of the cost
 BOTH = (186, 214, 168)
-MISSED = (90, 90, 235)  # of the mask only
-SPILLED = (235, 160, 70)  # of the body only
+MISSED = (90, 90, 235)  # pixels of the mask only
+SPILLED = (235, 160, 70)  # pixels of the body only
 LEFT = (80, 150, 245)
 RIGHT = (225, 165, 85)
 MIDDLE = (205, 205, 205)

@@ -132,9 +132,11 @@ class OutputFolder(Recorder):
                     f"{self.path}: cannot put the results there: {failure.strerror}; "
                     f"they are in {self.building}"
                 ) from None
+            # only a resumed track needs the record
             for name in (RECORD, *CARRIED_FILES):
                 (self.path / name).unlink(missing_ok=True)
             return
+        # keep the record to resume from, but no results, which may be half written
         notice = ""
         if self._recorded:
             for name in FILES:
@@ -146,6 +148,7 @@ class OutputFolder(Recorder):
             self._unfinished.close()
         else:
             self._unfinished.remove(_WRITTEN)
+        # the notice goes into the error's own message, if the user will see that
         if isinstance(error, OSError) and self._is_about_folder(error):
             cause = f"{error.strerror or error}{notice}"
             raise InputError(f"{self.path}: cannot write there: {cause}") from error

@@ -51,7 +51,7 @@ MIN_OVERLAY = 240  # pixels of width, so that the words fit
 OVERLAP = np.zeros((256, 1, 3), dtype=np.uint8)
 OVERLAP[:4, 0] = [BACKGROUND, MISSED, SPILLED, BOTH]
 SUMMARY_STILLS = 6  # frames on the summary
-SUMMARY_SCALE = 0.65  # of its text, which a page shows at three quarters of its size
+SUMMARY_SCALE = 0.65  # scale of its text, which a page shows at three quarters
 LABEL_HEIGHT = 38  # pixels of the strip behind the label
 SOLID = 0.65  # the opacity of the body over the footage
 MIN_OTHER_WEIGHT = 0.2  # modes with less weight are not drawn

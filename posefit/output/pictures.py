@@ -39,7 +39,7 @@ class _Attempt:
     """
 
     def __init__(self, path: Path | None) -> None:
-        self.path = path  # of the file; None if it is not wanted
+        self.path = path  # the file's path; None if it is not wanted
         self.failure = ""  # the message of the step that failed
 
     def run(self, step: Callable[..., _Made], *arguments: Any) -> _Made | None:
@@ -52,7 +52,7 @@ class _Attempt:
             cause = error.strerror if isinstance(error, OSError) else str(error)
             words = cut(" ".join((cause or "").split()))
             self.failure = words or type(error).__name__
-            # the warning has one line; `--debug` shows where a mistake of ours is
+            # the warning has one line; `--debug` shows where a fault of posefit is
             LOGGER.debug("%s", self.path, exc_info=True)
             return None
 

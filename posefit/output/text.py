@@ -24,7 +24,7 @@ GAIT_ROWS = (  # the measures of a foot: name, label, unit, factor and digits
     ("step_seconds", "step", "s", 1.0, 2),
     ("stance_share", "stance", "%", 100.0, 0),
 )
-MAX_NAMED = 8  # of more training motions only the first and the last are named
+MAX_NAMED = 8  # if there are more motions, only the first and the last are named
 
 
 def brief(track: Content) -> list[str]:

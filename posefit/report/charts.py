@@ -16,7 +16,7 @@ from posefit.statistics.means import Intervals
 from posefit.statistics.profiles import Trace, performance_profile
 from posefit.uncertainty.calibration import LEVELS
 
-POINTS = 41  # of a curve
+POINTS = 41  # points of a curve
 PROFILE_POINTS = 200  # points of a performance profile
 # the levels of intervals in percent, as they are named in rows
 LEVEL_NAMES = tuple(f"{100 * level:.0f}" for level in LEVELS)
@@ -27,8 +27,8 @@ class Line:
     """A method's line: points from left to right, with an interval of each.
 
     Attributes:
-        x: Of each point (n,), rising.
-        y: Of each point (n,).
+        x: The x of each point (n,), in ascending order.
+        y: The y of each point (n,).
         low: The lower ends of the intervals (n,), nan if unknown; None without
             intervals.
         high: The upper ends (n,).
@@ -118,7 +118,7 @@ def convergence(contest: Contest, evaluations: Array) -> list[Line | None]:
 
     Args:
         contest: The methods and the runs that they share.
-        evaluations: The numbers of evaluations (n,), rising.
+        evaluations: The numbers of evaluations (n,), in ascending order.
 
     Returns:
         For each method a line with intervals, or None if one of its runs has no trace.
@@ -126,7 +126,7 @@ def convergence(contest: Contest, evaluations: Array) -> list[Line | None]:
         run ends.
     """
 
-    def line(place: int, rows: Array) -> Line | None:
+    def line(index: int, rows: Array) -> Line | None:
         traces: Sequence[Trace] = contest.data("traces", rows)
         if not all(len(used) for used, _ in traces):
             return None
@@ -138,12 +138,12 @@ def convergence(contest: Contest, evaluations: Array) -> list[Line | None]:
         costs = []
         for used, best in traces:
             # the last improvement at or before each point
-            places = np.searchsorted(used, points, side="right") - 1
-            costs.append(best[places])
-        means = contest.means(place, np.array(costs).T)  # of (points, runs)
+            latest = np.searchsorted(used, points, side="right") - 1
+            costs.append(best[latest])
+        means = contest.means(index, np.array(costs).T)  # of (points, runs)
         return Line(points, means.values, means.low, means.high)
 
-    return [line(place, rows) for place, rows in enumerate(contest.blocks)]
+    return [line(index, rows) for index, rows in enumerate(contest.blocks)]
 
 
 def joint_errors(contest: Contest) -> list[Intervals]:
@@ -152,11 +152,11 @@ def joint_errors(contest: Contest) -> list[Intervals]:
     The list is empty if a run lacks the error of a joint.
     """
     intervals = []
-    for place, rows in enumerate(contest.blocks):
+    for index, rows in enumerate(contest.blocks):
         joints = np.array(contest.data("joint_errors", rows))  # (blocks, 27)
         if not np.isfinite(joints).all():
             return []
-        intervals.append(contest.means(place, joints.T.astype(np.float64)))
+        intervals.append(contest.means(index, joints.T.astype(np.float64)))
     return intervals
 
 

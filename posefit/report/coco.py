@@ -1,7 +1,7 @@
 """Single searches as files of COCO, which its post-processing `cocopp` reads.
 
-Each method has a folder, because cocopp names a method after its folder. The costs in
-it are above the true pose's.
+Each method has a folder, because cocopp names a method after its folder. Costs are
+written as differences from the cost of the true pose.
 
 Hansen et al., COCO: a platform for comparing continuous optimizers in a black-box
 setting, 2021.
@@ -16,8 +16,9 @@ from posefit.report.contest import Runs
 from posefit.suites.problem import TARGETS
 from posefit.suites.running import SuiteRun
 
-# COCO's logger writes two files for each run: one of the rows at which a target is
-# reached, one of the rows at certain evaluations. Here both have every improvement.
+# COCO's logger writes two files for each run: one with a row for each target that is
+# reached, one with a row at certain evaluations. Here both have a row for every
+# improvement.
 FILES = (".dat", ".tdat")
 FORMAT = "bbob-new2"  # the columns of `_rows`
 
@@ -84,7 +85,7 @@ def _index(name: str, file: str, group: Sequence[SuiteRun]) -> str:
 
 
 def _rows(run: SuiteRun) -> str:
-    """Return the rows of a run: function evaluations, 0 of constraints, best cost."""
+    """Return the rows of a run: evaluations, constraint evaluations (0), best cost."""
     lines = ["% f evaluations | g evaluations | best cost above the true pose's\n"]
     for used, cost in zip(run.evaluations, run.costs, strict=True):
         lines.append(f"{int(used)} 0 {_above_truth(run, cost):+.9e}\n")

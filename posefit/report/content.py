@@ -16,8 +16,8 @@ from posefit.report.summary import leader_sentences, unpaired_sentence
 from posefit.statistics.paired import POWER, SIGNIFICANCE
 from posefit.sweep.ledger import Ledger
 
-# How many the first screen names: the most frequent failures and warnings, and the
-# instances that are not compared.
+# The most that the first screen names: of the most frequent failures and warnings, and
+# of the instances that are not compared.
 MAX_DETAILS = 5
 MAX_MISSING = 20
 MAX_BLOCKS = 1_000_000  # tables only say that more are needed

@@ -28,8 +28,8 @@ from posefit.statistics.pairing import Shared, most_shared
 MIN_LOST = 3
 
 InstanceFields = Mapping[str, Any]  # the fields of a plan that define an instance
-Row = Mapping[str, Any]  # of a ledger
-Indices = Array | NDArray[np.int64]  # of rows
+Row = Mapping[str, Any]  # a row of a ledger
+Indices = Array | NDArray[np.int64]  # indices of rows
 
 
 @dataclass(frozen=True)
@@ -95,13 +95,13 @@ class Kind(Protocol):
         ...
 
     def figures(self, runs: "Runs", rows: Indices) -> dict[str, float | None]:
-        """Return each figure of some rows, given by their indices, together."""
+        """Return the average of each figure over some rows, given by their indices."""
         ...
 
-    def interval(self, contest: "Contest", place: int) -> tuple[float, float]:
+    def interval(self, contest: "Contest", index: int) -> tuple[float, float]:
         """Return the ends of the 95 % interval of a method's score, nan if unknown.
 
-        The method is given by its place among those that take part.
+        The method is given by its index among those that take part.
         """
         ...
 
@@ -161,7 +161,7 @@ class Runs:
         method: The index (n,) of each row's method.
         instance: The index (n,) of each row's instance.
         seed: The index (n,) of each row's seed.
-        seeds: The seeds, rising.
+        seeds: The seeds, in ascending order.
         keys: The first eight characters of each row's key (n,).
         figures: Each figure (n,) by name, nan if a row does not have it.
         data: The other data of each row, by the names of `Kind.data`.
@@ -233,7 +233,7 @@ class Runs:
         return int((self.figures["lost_rate"][rows] > 0.0).sum())
 
     def values(self, field: str) -> list[Any]:
-        """Return the distinct values of a field of methods or instances, rising."""
+        """Return the distinct values of a field of methods or instances, sorted."""
         definitions = (*self.variants, *self.instance_fields)
         return sorted({fields[field] for fields in definitions if field in fields})
 
@@ -266,14 +266,14 @@ class Contest(Shared):
             return np.asarray(self.blocks[self.methods.index(method)])
         return np.flatnonzero(self.runs.method == method).astype(np.int64)
 
-    def means(self, place: int, values: Array) -> Intervals:
+    def means(self, index: int, values: Array) -> Intervals:
         """Return the mean of each row of values (rows, blocks) of a method's runs.
 
         Intervals are for other seeds of the same instances. Their ends are nan if the
-        method, which is given by its place in `methods`, lost one or two tracks.
+        method, which is given by its index in `methods`, lost one or two tracks.
         """
         means = block_means(values, self.instance)
-        lost = self.runs.lost_tracks(self.blocks[place]) or 0
+        lost = self.runs.lost_tracks(self.blocks[index]) or 0
         if 0 < lost < MIN_LOST:
             means.low[:] = np.nan
             means.high[:] = np.nan
@@ -281,7 +281,7 @@ class Contest(Shared):
 
     @cached_property
     def instances(self) -> tuple[int, ...]:
-        """The indices of the shared instances, rising."""
+        """The indices of the shared instances, in ascending order."""
         return tuple(np.unique(self.instance).tolist())
 
     def instance_field(self, name: str) -> Array:
@@ -306,7 +306,7 @@ class Contest(Shared):
 
     @cached_property
     def comparisons(self) -> list[PairedTest]:
-        """The paired tests of all pairs of methods, given by their places in `methods`.
+        """The paired tests of all pairs of methods, by their indices in `methods`.
 
         There are none without two methods and two blocks.
         """
@@ -319,11 +319,11 @@ class Contest(Shared):
 
         A difference above 0 means that the other method is worse.
         """
-        place = self.methods.index(method)
+        index = self.methods.index(method)
         for test in self.comparisons:
-            if test.second == place:
+            if test.second == index:
                 yield self.methods[test.first], test
-            elif test.first == place:
+            elif test.first == index:
                 yield self.methods[test.second], test.turned
 
 

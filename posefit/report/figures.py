@@ -49,7 +49,7 @@ def chart_figure(
         chart: The chart.
         numbers: The number of each of these methods in the report, which decides its
             colour.
-        order: The methods in the order of the legend, by their places in `names`.
+        order: The methods in the order of the legend, by their indices in `names`.
 
     Returns:
         The figure.
@@ -118,12 +118,12 @@ def board_figure(standings: Standings) -> "Figure":
     axes = figure.add_subplot(xlabel=score.axis)
     axes.spines[["top", "right", "left"]].set_visible(False)
     axes.tick_params(axis="y", length=0)
-    for place, (row, value) in enumerate(rows):
+    for y, (row, value) in enumerate(rows):
         colour = COLOURS[row.method % len(COLOURS)]
         if row.interval:
-            axes.plot(row.interval, [place, place], color=colour)
+            axes.plot(row.interval, [y, y], color=colour)
         marker = MARKERS[row.method % len(MARKERS)]
-        axes.plot(value, place, marker=marker, color=colour)
+        axes.plot(value, y, marker=marker, color=colour)
     # each name is above the one to the left, because baselines may be close together
     for name, value in sorted(baselines, key=itemgetter(1)):
         top -= 0.5

@@ -56,10 +56,10 @@ class _Distinct:
 
 
 class _Ranked(NamedTuple):
-    """Distinct numbers in an order, and for each value (n,) its place among them."""
+    """Distinct numbers in an order, and for each value (n,) its rank among them."""
 
     numbers: list[int]
-    places: Array
+    ranks: Array
 
 
 class _Rows:
@@ -73,7 +73,7 @@ class _Rows:
         self.kind = kind
         self.methods = _Distinct()  # the fields that define each method
         self.instances = _Distinct()  # the fields that define each instance
-        self.seeds: dict[int, int] = {}  # in their order, of any size
+        self.seeds: dict[int, int] = {}  # each seed, of any size, with its number
         # each quarantined cell with the number of its method
         self.quarantined: list[tuple[int, Row]] = []
         # of each finished row: the numbers of its method, instance and seed
@@ -147,7 +147,7 @@ def runs_of(
     method = _ranked(method_of_row[numbers], chosen.index)
     instance = _ranked(np.array(rows.instance)[numbers], instance_key)
     seed = _ranked(np.array(rows.seed)[numbers], seeds.__getitem__)
-    order = np.lexsort((seed.places, method.places, instance.places))
+    order = np.lexsort((seed.ranks, method.ranks, instance.ranks))
     numbers = numbers[order]
 
     figures = {}
@@ -174,9 +174,9 @@ def runs_of(
         variants=tuple(variants[m] for m in method.numbers),
         instances=_instance_names(kind, instance_fields),
         instance_fields=tuple(instance_fields),
-        method=method.places[order],
-        instance=instance.places[order],
-        seed=seed.places[order],
+        method=method.ranks[order],
+        instance=instance.ranks[order],
+        seed=seed.ranks[order],
         seeds=tuple(seeds[k] for k in seed.numbers),
         keys=np.frombuffer(rows.keys, f"S{KEY_LENGTH}")[numbers],
         figures=figures,

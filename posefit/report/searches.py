@@ -21,7 +21,7 @@ from posefit.suites.problem import TARGETS
 from posefit.suites.running import ALL, SHOWN, SuiteRun, suite_scores
 
 RANDOM = "random"  # the baseline method
-POINTS = 61  # of a curve
+POINTS = 61  # points of a curve
 
 
 def search_run(row: Mapping[str, Any]) -> SuiteRun:
@@ -94,7 +94,7 @@ class Searches:
     )
 
     def computed(self, row: Row, /) -> dict[str, float]:
-        """Return the share of targets that a row reached, and its cost above."""
+        """Return a row's share of reached targets, and its cost above the truth."""
         run = search_run(row)
         return _figures(run, _hits(run))
 
@@ -160,11 +160,11 @@ class Searches:
         """Return the averages of some rows."""
         return runs.averages(rows)
 
-    def interval(self, contest: Contest, place: int) -> tuple[float, float]:
+    def interval(self, contest: Contest, index: int) -> tuple[float, float]:
         """Return the ends of the interval that other instances would give."""
         functions = contest.instance_field("function")
         instances = contest.instance_field("instance")
-        mean = mean_interval(contest.scores[place], functions, instances)
+        mean = mean_interval(contest.scores[index], functions, instances)
         return max(mean.low, 0.0), min(mean.high, 100.0)
 
     def baselines(self, contest: Contest) -> list[Baseline]:

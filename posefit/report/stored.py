@@ -52,18 +52,18 @@ class Traces:
 
     def __init__(self) -> None:
         self._distinct: list[Array] = []  # evaluations, each once
-        self._places: dict[bytes, int] = {}  # their places in the list
-        self._used = array("q")  # of each trace, the place of its evaluations
+        self._indices: dict[bytes, int] = {}  # their indices in the list
+        self._used = array("q")  # the index of each trace's evaluations
         self._costs = Packed()
 
     def append(self, trace: Trace) -> None:
         """Add the evaluations (n,) at which the cost fell, and the costs (n,)."""
         used, costs = trace
         name = used.tobytes()
-        if name not in self._places:
-            self._places[name] = len(self._distinct)
+        if name not in self._indices:
+            self._indices[name] = len(self._distinct)
             self._distinct.append(used)
-        self._used.append(self._places[name])
+        self._used.append(self._indices[name])
         self._costs.append(costs)
 
     def __getitem__(self, k: int) -> Trace:

@@ -255,9 +255,9 @@ class Tracks:
             figures[f"skill.{name}"] = _skill(figures[LOSS], baseline)
         return figures
 
-    def interval(self, contest: Contest, place: int) -> tuple[float, float]:
+    def interval(self, contest: Contest, index: int) -> tuple[float, float]:
         """Return the ends of the interval of a method's mean error."""
-        means = contest.means(place, contest.scores[place : place + 1])
+        means = contest.means(index, contest.scores[index : index + 1])
         return float(means.low[0]), float(means.high[0])
 
     def baselines(self, contest: Contest) -> list[Baseline]:

@@ -11,7 +11,7 @@ from posefit.errors import InputError
 from posefit.statistics.pairing import finite
 
 CONFIDENCE = 0.95
-MIN_RUNS = 8  # of a method; fewer have too uncertain a spread for an interval
+MIN_RUNS = 8  # with fewer, a method's spread is too uncertain for an interval
 
 
 @dataclass(frozen=True)

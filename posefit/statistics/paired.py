@@ -33,8 +33,8 @@ class PairedTest:
         low: The lower end of the difference's 95 % interval, adjusted like p. It is nan
             if there are too few blocks to show any difference.
         high: The upper end.
-        p_value: The p of the test.
-        adjusted: The p after Holm's correction for all comparisons.
+        p_value: The p-value of the test.
+        adjusted: The p-value after Holm's correction for all comparisons.
         blocks_needed: How many blocks would show a difference of this size, inf if the
             difference is 0.
     """
@@ -133,9 +133,9 @@ def paired_tests(errors: ArrayLike) -> list[PairedTest]:
 
 
 def _p_values(means: Array, spreads: Array, blocks: int) -> Array:
-    """Return the p of a paired t test (pairs,).
+    """Return the p-values (pairs,) of paired t tests.
 
-    Without spread it is 0, or 1 if the mean difference is 0 as well.
+    Without spread a p-value is 0, or 1 if the mean difference is 0 as well.
     """
     # pairs without spread divide by 0, and get their p in the last line
     with np.errstate(divide="ignore", invalid="ignore"):

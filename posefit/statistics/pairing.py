@@ -54,7 +54,7 @@ class Shared:
     """The runs that some methods share, in blocks: an instance with a seed each.
 
     Attributes:
-        methods: The methods that take part, rising.
+        methods: The methods that take part, in ascending order.
         blocks: The row of each run (methods, blocks), by instance, then by seed.
         instance: The instance of each block (blocks,).
         left_out: The number of these methods' runs that not all of them have.

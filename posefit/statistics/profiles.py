@@ -1,7 +1,7 @@
-"""Shares of runs and targets that are reached within some evaluations or an error.
+"""Shares: of targets reached within some evaluations, of runs within an error.
 
-An anytime trace consists of evaluations (k,), rising, and the best cost so far (k,) at
-each, which never rises.
+An anytime trace consists of increasing evaluations (k,) and the best cost so far (k,)
+at each, which never rises.
 """
 
 import numpy as np
@@ -19,7 +19,7 @@ def hits(run: Trace, targets: ArrayLike) -> Array:
 
     Args:
         run: The anytime trace of the run.
-        targets: Costs (targets,). A target is reached by a cost as low.
+        targets: Costs (targets,). A cost reaches a target if it is not above it.
 
     Returns:
         The evaluations, inf for a target that was never reached.

@@ -28,7 +28,7 @@ SIZES = (6, 7, 13, 17, 21, 37)
 # These joint angles turn a hand about its forearm, which a silhouette does not show
 # unless fingers move as well.
 SHOW_NOTHING = (49, 61)
-FRAMES = 8  # of a sequence
+FRAMES = 8  # frames of a sequence
 # Of five mixed latents, four have these numbers of values, and the fifth is continuous.
 VALUES = (2, 4, 8, 16)
 # the range, to either side, of joint angles that are constant in the data

@@ -17,8 +17,8 @@ class SuiteFunction:
     """One kind of problem, in some dimensions.
 
     Attributes:
-        number: Its number.
-        name: Its name.
+        number: The function's number.
+        name: The function's name.
         summary: A description in half a sentence.
         exact: Whether some proposal has the cost 0, as the silhouette is one of the
             box's poses.

@@ -40,7 +40,7 @@ from posefit.suites.boxes import (
 
 SIZE = (120, 160)  # pixels
 PLACE = np.array([0.0, 0.9, 0.0])  # metres; the place of the root, where cameras aim
-AWAY = 3.5  # metres from a camera to the place
+CAMERA_DISTANCE = 3.5  # metres from a camera to the place
 FIELD = np.radians(40.0)  # field of view across the larger side
 ROOT_RANGE = np.radians([45.0, 20.0, 20.0])  # to either side: yaw, pitch, roll
 YAW_OFF = np.radians(20.0)  # the largest distance of the true yaw from the box's middle
@@ -55,7 +55,7 @@ POOL = 32  # damaged silhouettes of a noisy instance
 # The order of the damaged silhouettes, which repeats. Its length is a prime.
 ORDER = generator("suite").integers(POOL, size=10_007)
 ANCHOR_OFF = 0.3  # metres; the largest error of an alignment's anchor along each axis
-DIGITS = 4  # of a true proposal, so that it is the same on every machine
+DIGITS = 4  # digits of a true proposal, which is then the same on every machine
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,7 +199,7 @@ class _Draft:
 
     def camera(self, azimuth: float) -> Camera:
         """Return a camera at an azimuth in radians."""
-        return Camera.around(PLACE, azimuth, AWAY, SIZE, FIELD)
+        return Camera.around(PLACE, azimuth, CAMERA_DISTANCE, SIZE, FIELD)
 
     def silhouette(self, camera: Camera, pose: Array) -> Silhouette:
         """Return the silhouette of the true body in a pose (66,)."""
@@ -275,7 +275,7 @@ def _next_frame(draft: _Draft) -> SuiteInstance:
 
 
 def _noisy(draft: _Draft) -> SuiteInstance:
-    """Return an instance whose silhouette has another damage at each evaluation."""
+    """Return an instance with a differently damaged silhouette at each evaluation."""
     made = _single(draft)
     rng = draft.rng
     mask = made.frames[0].silhouettes[0].mask

@@ -43,7 +43,7 @@ class SuiteRun:
         budget: The most evaluations.
         infeasible: The treatment of infeasible proposals, see `SuiteCost`.
         truth_cost: The cost of the true pose.
-        targets: The costs of the targets (t,), falling.
+        targets: The costs of the targets (t,), in descending order.
         evaluations: Evaluations of the trace (k,), the last one at the end of the run.
         costs: The best cost after each of these (k,).
         looked: Whether the method read the silhouette, see `Problem.look`.

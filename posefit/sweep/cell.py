@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from posefit.footage.scene import Scene
 
 ALL_AROUND = 180.0  # degrees; with an error this large the yaw is unknown
-RNG_STREAM_PERSON = 2001  # of the errors in a method's knowledge of the person
+RNG_STREAM_PERSON = 2001  # errors in what a method knows of the person
 DROPPED = "dropped"  # the corruption that removes a share of the frames
 # measures that a row has under another name, or lacks
 RENAMED_MEASURES = ("evaluations", "evaluations_per_second")
@@ -70,7 +70,7 @@ class Cell:
 
     @property
     def _values(self) -> dict[str, Any]:
-        # of a dataclass these are the names of its fields
+        # in a dataclass these are the names of the fields
         names: tuple[str, ...] = self.__match_args__  # type: ignore[attr-defined]
         return {"kind": self.kind, **{name: getattr(self, name) for name in names}}
 
@@ -121,7 +121,7 @@ class TrackCell(Cell):
             gets. At 180 it gets no yaw. The error depends on the instance and the
             motion's name.
         body_off_percent: The largest error of each bone's length and radii that the
-            method gets. It depends on the same two.
+            method gets. It depends on the instance and the motion's name, too.
         seed: The seed of all random numbers.
         name: The method's name in reports.
         files: The SHA-256 of each motion file that is read, by path.

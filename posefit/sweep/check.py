@@ -37,7 +37,7 @@ from posefit.tracking.method import method_names, parsed_settings, places_of
 from posefit.tracking.options import TrackOptions
 from posefit.version import source_digest
 
-# the fields of a track that a plan may set; posefit adds the other two
+# the fields of a track that a plan may set; posefit adds `files` and `version`
 FIELDS = tuple(
     field.name for field in fields(TrackCell) if field.name not in ("files", "version")
 )
@@ -145,7 +145,7 @@ def search_method(entry: Mapping[str, Any]) -> dict[str, Any]:
                 f"settings must name {optimiser}.{setting} once, got it twice"
             )
         chosen[setting] = value
-    # as texts, like those of tracks: a plan has no other form of None
+    # as texts, like the settings of tracks, because TOML has no null
     texts = settings.settings_text(chosen)
     return {
         **entry,

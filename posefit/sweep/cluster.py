@@ -19,10 +19,10 @@ from posefit.sweep.engine import POLL_SECONDS, Limits, Outcome, Run, text_of
 from posefit.sweep.pool import Pool
 from posefit.version import posefit_build
 
-CONNECT_TIMEOUT_SECONDS = 30.0  # of waiting for a scheduler, and for its workers
-CLOSE_SECONDS = 5.0  # of waiting for a result that is ready, and for the end
-# An expression of a process's posefit build. It is a text, because a function of
-# posefit could not be sent to a process that lacks posefit.
+CONNECT_TIMEOUT_SECONDS = 30.0  # the longest wait for a scheduler and its workers
+CLOSE_SECONDS = 5.0  # the longest wait for a ready result, and for the end
+# An expression for the posefit build of a process. It is a string, because a function
+# of posefit could not be sent to a process that lacks posefit.
 _BUILD = "__import__('posefit.version', fromlist=['version']).posefit_build()"
 _thread = threading.local()  # the pool of each thread of a Dask worker
 
@@ -100,8 +100,8 @@ class Cluster:
     def window(self) -> int:
         """Return twice the number of threads of all workers, but at least one.
 
-        A worker that ends a job then has the next one already. Dask keeps a job while
-        there are no workers.
+        So a worker that ends a job already has the next one. While there are no
+        workers, Dask keeps the job.
         """
         try:
             return max(1, 2 * int(sum(self._client.nthreads().values())))

@@ -52,7 +52,7 @@ def swept(
 
     from posefit.silhouette.cost import compile_kernels
 
-    # else each worker would compile them
+    # compiled and cached now, because each worker would otherwise compile them
     compile_kernels()
     file, *others = ledgers_of(out, shard)
     with closing(engine), Writer(file) as ledger:

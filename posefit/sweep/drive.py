@@ -29,11 +29,11 @@ class Tally:
     """The state of a sweep, in numbers of cells."""
 
     cells: int
-    done: int = 0  # with a row
+    done: int = 0  # cells with a row
     ran: int = 0  # done by this driver
     failed: int = 0  # attempts of this driver that failed
     quarantined: int = 0
-    stopped: bool = False  # by the user
+    stopped: bool = False  # whether the user stopped the sweep
 
 
 def drive(
@@ -61,8 +61,8 @@ def drive(
     tally = Tally(counts.total(), counts["done"], quarantined=counts["quarantined"])
     watch(tally)
     waiting = deque(ledger.planned())
-    running = dict[str, int]()  # place in the ledger by the cell's key
-    ended: list[tuple[int, Outcome]] = []  # not written yet, with their places
+    running = dict[str, int]()  # row in the ledger by the cell's key
+    ended: list[tuple[int, Outcome]] = []  # not written yet, with their rows
     written = time.monotonic()
     try:
         with _stopping(say) as stop_requests:
@@ -71,9 +71,9 @@ def drive(
             ):
                 window = engine.window()
                 while waiting and not stop_requests and len(running) < window:
-                    place = waiting.popleft()
-                    cell = ledger.cell(place)
-                    running[cell.key] = place
+                    rowid = waiting.popleft()
+                    cell = ledger.cell(rowid)
+                    running[cell.key] = rowid
                     engine.submit(cell, foreign_plugins(cell.version))
                 is_due = time.monotonic() - written >= WRITE_SECONDS
                 if ended and (is_due or not running):
@@ -85,7 +85,7 @@ def drive(
                         ended.append((running.pop(outcome.job.key), outcome))
         waiting += _write(ledger, tally, ended)
     except InputError as error:
-        # the engine may be gone; if it is the ledger, `ended` is empty
+        # if the engine failed, outcomes may remain; if the ledger did, `ended` is empty
         _write(ledger, tally, ended)
         safe = (
             f"{tally.done} of {tally.cells} cells are done and safe: "
@@ -100,7 +100,7 @@ def drive(
 
 
 def _write(ledger: Writer, tally: Tally, ended: list[tuple[int, Outcome]]) -> list[int]:
-    """Write, count and remove outcomes. Returns the places of cells to try again."""
+    """Write, count and remove outcomes. Returns the rows of cells to try again."""
     if not ended:
         return []
     batch = ended.copy()
@@ -110,9 +110,9 @@ def _write(ledger: Writer, tally: Tally, ended: list[tuple[int, Outcome]]) -> li
     # a row counts once it is on the disk, so count in a copy until then
     written = replace(tally)
     with ledger.transaction():
-        for place, outcome in batch:
+        for rowid, outcome in batch:
             if not _record(ledger, written, outcome):
-                again.append(place)
+                again.append(rowid)
     vars(tally).update(vars(written))
     return again
 

@@ -30,7 +30,7 @@ def unusable(file: Path, error: Exception, *, writes: bool = False) -> InputErro
     elif not writes:
         found = (
             f"one that cannot be opened here ({found}): copy it, "
-            f"with {file.name}{WAL} if that exists, to a folder of yours"
+            f"with {file.name}{WAL} if that exists, to a folder of your own"
         )
     wanted = "written to" if writes else "read"
     return InputError(f"{file}: expected a ledger that can be {wanted}, got {found}")

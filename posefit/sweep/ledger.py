@@ -38,13 +38,13 @@ if TYPE_CHECKING:
     import pandas as pd
 
 OPEN_SECONDS = 5.0  # the longest wait for a program that locks a file
-MAX_VALUE_BYTES = 200_000_000  # of one value that is read
+MAX_VALUE_BYTES = 200_000_000  # the largest value that is read
 
 
 class Ledger:
     """Reads ledgers, also while drivers write to them.
 
-    It has the rows of the moment when it was opened. It is a context manager that
+    It shows the rows as they were when it was opened. It is a context manager that
     closes its files at the end. If several files have the same cell, the first finished
     one counts.
 
@@ -162,7 +162,7 @@ class Ledger:
 
         A cell counts once, and as finished if it is finished in any of the files.
         """
-        # the keys of one file differ, so it needs no set of perhaps a million
+        # keys are unique within a file, so one file needs no set of up to a million
         several = len(self._files) > 1
         counted = set[str]()
         if several and status != "done":

@@ -55,8 +55,8 @@ PARTS = {"optimisers": "optimiser", "priors": "prior"}  # the parts of a method
 TABLES = ("defaults", "product", "grid", "cells")
 DEFAULT = "default"  # the name of the plan that comes with posefit
 INPUT = "-"  # the name of a plan that is read from standard input
-MAX_CELLS = 1_000_000  # of a product
-MAX_BYTES = 1_000_000  # of a plan's text
+MAX_CELLS = 1_000_000  # most cells of a product
+MAX_BYTES = 1_000_000  # most bytes of a plan's text
 # what a grid contains, for messages
 GRID = 'settings and their values such as "sapso.inertia" = [0.7, 0.9]'
 
@@ -251,6 +251,7 @@ def _with_methods(crossed: Mapping[str, Any]) -> dict[str, Any]:
         settings: dict[str, Any] = {}
         for kind, table in (("optimiser", optimiser), ("prior", prior)):
             name = table[kind].partition(":")[0]
+            # in the entry of a part, its name may be left out of its settings' names
             for key, value in flattened("settings", table.get("settings", {})).items():
                 settings[key if "." in key else f"{name}.{key}"] = value
         method = f"{optimiser['optimiser']}@{prior['prior']}"
@@ -265,7 +266,7 @@ def _searches(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
     """Return a function that makes the cells of a plan of searches.
 
     A function has no cells in dimensions in which it does not exist. Raises InputError
-    if that leaves a function that the plan names without any.
+    if a function that the plan names exists in none of its dimensions.
     """
     check_names(
         "a plan of a suite", tables, ("suite", *SEARCH_LISTS, "infeasible", "grid")
@@ -273,7 +274,7 @@ def _searches(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
     shared = {name: tables[name] for name in ("suite", "infeasible") if name in tables}
     lists = {}
     for name, (field, default) in SEARCH_LISTS.items():
-        # instances before these may have been used to choose settings
+        # settings may have been chosen on the instances before these
         first = HELD_OUT.start if name == "instances" else 0
         lists[field] = _listed(name, field, tables.get(name, default), first)
     methods = _gridded(

@@ -40,7 +40,7 @@ class Pool:
         self._count = workers
         self._limits = limits
         self._task = cloudpickle.dumps((run, prepare))
-        self._workers: list[Worker] = []  # by the time of their last use
+        self._workers: list[Worker] = []  # sorted by the time of their last use
 
     def window(self) -> int:
         """Return how many jobs may run at a time."""
@@ -50,7 +50,7 @@ class Pool:
         """Start a job in an idle process of its tenant, or in a new one."""
         idle = [worker for worker in self._workers if not worker.is_busy]
         for worker in idle.copy():
-            # it may have been killed meanwhile
+            # an idle process may have been killed meanwhile
             if not worker.is_alive:
                 self._end(worker)
                 idle.remove(worker)

@@ -22,7 +22,7 @@ from posefit.sweep.shard import cells_of, done_in, file_of, ledgers_of
 from posefit.sweep.versions import foreign_plugins
 
 MAX_VALUES = 12  # the most values of a field that a preview lists
-FRAMES = 4  # of the short run of a method
+FRAMES = 4  # frames of the short run of a method
 
 
 class Preview(NamedTuple):
@@ -30,7 +30,7 @@ class Preview(NamedTuple):
 
     lines: list[str]
     cells: list[dict[str, Any]]  # key, done and spec of each
-    seconds: float  # of the cells to run, one after the other
+    seconds: float  # time of the cells to run, one after the other
 
 
 def preview(plan: str, out: str | None, shard: str | None, limits: Limits) -> Preview:
@@ -49,7 +49,7 @@ def preview(plan: str, out: str | None, shard: str | None, limits: Limits) -> Pr
         ValueError: The plan is wrong, or a method fails in its first frames.
     """
     counts: dict[str, Counter[str]] = {}
-    to_run: dict[str, list[Cell]] = {}  # by method and settings
+    to_run: dict[str, list[Cell]] = {}  # cells by method and settings
     listed = []
     for cell, done in _cells(plan, out, shard):
         listed.append({"key": cell.key, "done": done, **cell.spec})
@@ -122,9 +122,10 @@ def _seconds_of(cells: Sequence[Cell], pool: Pool) -> float:
     first = cells[0]
     amount = sum(map(_amount, cells))
     if isinstance(first, TrackCell):
-        # a motion may be shorter
+        # the cell may have fewer frames
         first = replace(first, frames=min(first.frames, FRAMES))
-        _row(first, pool)  # imports and compiles
+        # a first run imports and compiles; the second is timed
+        _row(first, pool)
     row = _row(first, pool)
     searching = row["seconds"]
     if isinstance(first, TrackCell):

@@ -21,7 +21,7 @@ from posefit.sweep.table import flat
 
 TIMES = ("seconds", "seconds_per_frame", "cpu_seconds_per_frame")
 MAX_SHOWN = 12  # the most differing figures that are listed
-# a command is one of these, the lines of a plan, and the end
+# a command consists of one of these beginnings, the lines of a plan, and the end
 BEGIN = "posefit sweep - --out rerun <<'END'\n"
 TRACK_BEGIN = f"{BEGIN}[[cells]]\n"
 END = "END"
@@ -44,7 +44,7 @@ def rerun(ledger: str | Path, key: str, out: str | Path | None = None) -> list[s
     Raises:
         ValueError: No row or several have the key, the cell cannot be planned with this
             version of posefit, or `out` has its row already.
-        KeyboardInterrupt: It was stopped before the cell had ended.
+        KeyboardInterrupt: The user stopped it before the cell had ended.
     """
     earlier = _row_of(ledger, key)
     plan = Plan.of(plan_tables(earlier["spec"]))

@@ -25,7 +25,7 @@ from posefit.errors import PluginWarning
 from posefit.limits import end_with_parent, memory
 from posefit.sweep.engine import Run, text_of
 
-MARK = "POSEFIT_WORKER"  # the environment variable of a process' mark
+MARK = "POSEFIT_WORKER"  # the environment variable with the mark of a worker
 STARTED = b""  # a worker sends this once, when it can take jobs
 # environment variables with the number of threads of libraries
 THREADS = (
@@ -70,12 +70,12 @@ def serve(
                 state.restore()
             answer = cloudpickle.dumps((result, None))
         except MemoryError:
-            reason = f"it wanted more memory than its limit of {gigabytes:g} GB"
+            reason = f"it needed more memory than its limit of {gigabytes:g} GB"
             answer = pickle.dumps((None, reason))
         # also SystemExit: a cell that exits must not end its worker
         except BaseException as error:
             answer = pickle.dumps((None, text_of(error)))
-        # a job may have forked the process, but there is one answer
+        # if the job forked, only the original process may answer
         if os.getpid() != process:
             os._exit(0)
         connection.send_bytes(answer)

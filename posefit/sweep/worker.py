@@ -53,7 +53,7 @@ class Worker:
         tenant: Whose jobs it runs, see `posefit.sweep.engine.Engine.submit`.
 
     Attributes:
-        tenant: The same.
+        tenant: Whose jobs it runs.
         connection: Becomes readable when the process has started, or a job ends.
     """
 

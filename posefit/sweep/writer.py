@@ -23,7 +23,7 @@ from posefit.sweep.schema import FORMAT, MIGRATIONS, SUFFIX, VERSIONS, WAL, form
 ATTEMPTS = 3
 LOSSES = 50
 BUSY_SECONDS = 60.0  # the longest wait for a program that locks the file in a sweep
-PAGE_BYTES = 8192  # of a new file; a page then contains about three rows
+PAGE_BYTES = 8192  # page size of a new file; a page contains about three rows
 NAMES = ("key", "spec", "status")  # the parts of a row that are not figures
 
 
@@ -134,14 +134,14 @@ class Writer:
         )
 
     def planned(self) -> list[int]:
-        """Return the places of the plan's cells to run, with failed ones at the end."""
+        """Return the row numbers of the plan's cells to run, failed ones at the end."""
         # `faults` is a JSON list, and "[]" has two characters
         query = (
             "SELECT cells.rowid FROM planned JOIN cells USING (key) "
             "WHERE status = 'planned' "
             "ORDER BY length(faults) > 2 OR losses > 0, cells.rowid"
         )
-        return [place for (place,) in self._db.execute(query)]
+        return [rowid for (rowid,) in self._db.execute(query)]
 
     def counts(self) -> Counter[str]:
         """Return how many of the plan's cells are planned, done and quarantined."""
@@ -153,10 +153,10 @@ class Writer:
         counts["done"] += self._elsewhere
         return +counts
 
-    def cell(self, place: int) -> Cell:
-        """Return the cell at a place, as `planned` returns them."""
+    def cell(self, rowid: int) -> Cell:
+        """Return the cell of a row number, as `planned` returns them."""
         query = "SELECT spec FROM cells WHERE rowid = ?"
-        (spec,) = self._db.execute(query, [place]).fetchone()
+        (spec,) = self._db.execute(query, [rowid]).fetchone()
         return cell_from(json.loads(spec))
 
     def finish(self, key: str, row: Mapping[str, Any]) -> bool:

@@ -22,12 +22,12 @@ from posefit.testing.results import BrokenError, SkippedError, expect
 from posefit.testing.toy import Toy, ball, shell, slope, sphere
 
 EVALUATIONS = 400  # budget of a search unless a check needs a special one
-# budget of a search as long as a frame's, and the most populations it may have
+# budget of a search that is as long as a frame's, and its most populations
 LONG = 2_440
 LONG_ASKS = 100
-BUDGET = 800  # of the searches that have to beat chance
+BUDGET = 800  # budget of the searches that have to beat chance
 SEEDS = range(5)
-MAX_SHARE_OF_CHANCE = 0.95  # a cost beats chance if it is below this share of it
+MAX_SHARE_OF_CHANCE = 0.95  # a cost beats chance if it is below this share of chance's
 # for the search in a corner of a nine-dimensional box, with the budget that the SAPSO
 # paper gives a frame: an optimiser that stops short of the sides keeps a fifth of
 # chance's cost
@@ -489,7 +489,7 @@ def _beats_chance(case: Case, space: Space, evaluate: Evaluate) -> str:
     for seed in SEEDS:
         lowest.append(case.best(space, evaluate, seed, BUDGET))
         if np.count_nonzero(np.array(lowest) < below) > len(SEEDS) // 2:
-            # the median is below for any results of the other seeds
+            # the median is below, whatever the other seeds give
             break
     best = float(np.median(lowest))
     expect(

@@ -36,7 +36,7 @@ class Result:
     name: str
     outcome: Literal["passed", "failed", "skipped"]
     detail: str = ""
-    traceback: str = ""  # of the plugin's error, from its first own frame
+    traceback: str = ""  # of the plugin's error, from the plugin's first frame
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ def run_checks(plugin: str | Callable[..., Any], checks: Iterable[Check]) -> Rep
         results.append(not_run(check.name, results) or check.run())
     if isinstance(plugin, str):
         return Report(plugin, tuple(results))
-    function = getattr(plugin, "func", plugin)  # of a partial, the function itself
+    function = getattr(plugin, "func", plugin)  # the function inside a `partial`
     return Report(getattr(function, "__name__", repr(plugin)), tuple(results))
 
 

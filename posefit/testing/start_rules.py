@@ -121,7 +121,7 @@ def same_again(case: Case) -> None:
         and np.array_equal(again.poses, first.poses)
         and np.array_equal(again.weights, first.weights)
     )
-    expect(same, "two starts must guess the same of one frame, got other poses")
+    expect(same, "two starts must guess the same poses for a frame, got others")
 
 
 def inputs(case: Case) -> None:
@@ -156,10 +156,10 @@ def gain(case: Case) -> str:
     guided, blind = np.mean(costs, axis=0)
     expect(
         guided < blind,
-        f"the best of a population must cost less than {blind:.1f}, from anywhere, "
+        f"the best of a population must cost less than {blind:.1f}, without a start, "
         f"got {guided:.1f}",
     )
-    return f"cost {guided:.1f}, from anywhere {blind:.1f}"
+    return f"cost {guided:.1f}, without a start {blind:.1f}"
 
 
 def speed(case: Case) -> str:

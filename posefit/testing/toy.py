@@ -16,7 +16,7 @@ TARGET = 0.3
 
 
 def anywhere(proposals: Array) -> NDArray[np.bool_]:
-    """Return that all proposals (n, d) are allowed."""
+    """Return True for all proposals (n, d), which are all allowed."""
     return np.ones(len(proposals), dtype=bool)
 
 

@@ -54,7 +54,7 @@ class Tracked(NamedTuple):
         tracker: The tracker, after its first track.
         frames: One per observation.
         taken: How many observations it had taken when it gave each frame.
-        warnings: Of the audit.
+        warnings: The warnings of the audit.
         inputs_unchanged: Whether masks and anchor are as before.
         random_unchanged: Whether the global random generators are as before.
     """
@@ -173,7 +173,7 @@ def used_twice(case: Case) -> None:
     """A tracker that has tracked before gives the same track again."""
     expect(
         case.same(case.first.tracker),
-        "a second track must be as the first, got another",
+        "a second track must equal the first, got another",
     )
 
 

@@ -578,18 +578,18 @@ def test_a_new_plugin_has_new_names_and_replaces_nothing(tmp_path: Path) -> None
     for words, message in [
         (
             ["track", "--kind", "command"],
-            "name must be new, got 'track', which posefit registers already",
+            "name must be new, got 'track', which posefit already registers",
         ),
         (
             ["bench", "--kind", "command"],
-            "name must be new, got 'bench', which posefit registers already",
+            "name must be new, got 'bench', which posefit already registers",
         ),
         (
             ["sapso"],
-            "name must be new, got 'sapso', which posefit registers already",
+            "name must be new, got 'sapso', which posefit already registers",
         ),
         *(([name], hidden.format(name)) for name in ("swarm", "reproduce", "envs")),
-        (["9 lives"], "name must be small letters"),
+        (["9 lives"], "name must be lower-case letters"),
         (
             ["a", "--kind", "camera"],
             "kind must be one of optimiser, prior, tracker, start, segmenter, command",

@@ -204,7 +204,7 @@ WRONG: dict[str, list[tuple[dict[str, Any], str]]] = {
         ({"size": (20, 20)}, r"size must be \(width, height\) of 36 to 4096 pixels"),
         (
             {"view_degrees": float("nan")},
-            "view_degrees must be a finite number or several",
+            "view_degrees must be one finite number or several",
         ),
         ({"mismatch_percent": 80.0}, "mismatch_percent must lie in 0 to 50"),
         (
@@ -216,8 +216,8 @@ WRONG: dict[str, list[tuple[dict[str, Any], str]]] = {
     "posefit/FitImage-v1": [
         ({"max_evaluations": 0}, "max_evaluations must be at least 1, got 0"),
         ({"yaw": "any"}, "yaw must be one of guessed, unknown, got 'any'"),
-        ({"motion": []}, r"motion must be a name, several, or 'all', got \[\]"),
-        ({"motion": 3}, "motion must be a name, several, or 'all', got 3"),
+        ({"motion": []}, r"motion must be a name, several names, or 'all', got \[\]"),
+        ({"motion": 3}, "motion must be a name, several names, or 'all', got 3"),
         ({"motion": ["walk", "rnu"]}, "motion must be one of walk, .*, got 'rnu'"),
         (
             {"motion": "walk-a", "held_out_people": True},
@@ -312,7 +312,7 @@ def test_an_action_outside_is_clipped_with_one_warning(name: str) -> None:
     size = (env.action_space.shape or ())[0]
     with pytest.warns(
         UserWarning,
-        match=r"actions must lie in \[-1, 1\], got 3 from 0: actions are clipped",
+        match=r"actions must lie in \[-1, 1\], got one of size 3: actions are clipped",
     ):
         clipped = env.step(np.full(size, 3.0))
     assert data_equivalence(clipped, other.step(np.ones(size)))

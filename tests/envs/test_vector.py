@@ -251,7 +251,9 @@ def test_mistakes_are_named(name: str) -> None:
     vector = gym.make_vec(name, num_envs=3)
     with pytest.raises(error.ResetNeeded, match="reset must come before"):
         vector.step(np.zeros((3, 9)))
-    with pytest.raises(error.Error, match="seed must be one number or 3, got 2"):
+    with pytest.raises(
+        error.Error, match="seed must be one number or 3 numbers, got 2"
+    ):
         vector.reset(seed=[1, 2])
     with pytest.raises(error.ResetNeeded, match="the first reset must be of all"):
         vector.reset(options={"reset_mask": np.array([True, False, False])})

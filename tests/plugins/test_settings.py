@@ -138,7 +138,8 @@ def test_values_are_checked_as_texts_are() -> None:
         with pytest.raises(ValueError, match=message):
             check("it", factory, given)
     with pytest.raises(
-        ValueError, match="a setting of bare must be none, it takes none, got 'x'"
+        ValueError,
+        match="a setting of bare must be left out, because it takes none, got 'x'",
     ):
         check("bare", lambda space, rng: None, {"x": 1})
 

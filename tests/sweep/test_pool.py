@@ -96,7 +96,7 @@ def test_exceptions_exits_and_limits_of_memory_and_time_are_the_cells_own_faults
     reasons = {
         fake.RAISE: "ZeroDivisionError: one by none",
         fake.EXIT: "SystemExit: 0",
-        fake.HOG: "it wanted more memory than its limit of 0.6 GB",
+        fake.HOG: "it needed more memory than its limit of 0.6 GB",
     }
     ended = one_by_one(make(1), [replace(cells(1)[0], frames=n) for n in reasons])
     ended += one_by_one(

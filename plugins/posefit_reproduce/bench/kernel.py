@@ -21,7 +21,7 @@ from posefit.testing.problem import walking_angles
 from posefit_priors.pca import COMPONENTS, PCA
 
 SIZE = (320, 240)  # pixels
-ROUNDS = 12  # of all jobs in turn; the fastest run of each counts
+ROUNDS = 12  # in a round each job runs; the fastest run of each counts
 TURN = 0.05  # seconds: a job is repeated until its turn is over
 
 

@@ -31,7 +31,7 @@ POSES = 1000  # in one call of a cost
 # the population size and the budget of a search
 PARTICLES = 40
 EVALUATIONS = 2440
-SEARCHES = 5  # of each optimiser; the fastest counts
+SEARCHES = 5  # searches by each optimiser; the fastest counts
 SLOW_SECONDS = 3.0  # no further search of an optimiser begins after this time
 
 

@@ -62,8 +62,8 @@ COMPARED = {
 class Scale:
     """The size of the experiments.
 
-    Single images use every other seed. Their letter is eight times as slow and uses
-    only the first seed.
+    Single images use every other seed. On these SAPSO to the letter is eight times as
+    slow, and uses only the first seed.
     """
 
     seeds: int = 10

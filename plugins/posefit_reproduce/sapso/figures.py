@@ -36,7 +36,7 @@ from posefit_reproduce.sapso.tables import Analysis
 from posefit_swarm.sapso import SAPSO
 
 MOTIONS = ("walk", "run")
-SHOWN_VIEW = 45.0  # of figure 5
+SHOWN_VIEW = 45.0  # degrees; the view of figure 5
 _DIM = "0.55"
 _LEGEND: dict[str, Any] = {"fontsize": 8, "frameon": False}
 

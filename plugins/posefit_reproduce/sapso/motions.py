@@ -18,8 +18,8 @@ from posefit.motion.motion import Motion
 from posefit.sweep.cell import digest_of
 
 SIZE = (320, 240)  # pixels
-# ours: the paper gives none; at this rate a clip of a walk has more than the 100
-# frames, and of a run nearly
+# ours, because the paper gives no rate: at this one, a clip of a walk has more than the
+# 100 frames, and a clip of a run nearly as many
 FPS = 60.0
 # the test clip and the training clips; each person has only one run, so the run's prior
 # learns from others

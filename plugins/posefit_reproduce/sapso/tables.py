@@ -446,7 +446,7 @@ def _view_heads(analysis: Analysis, kind: str) -> list[str]:
 
 
 def parts_table(analysis: Analysis) -> Table:
-    """Return how much worse PCA + SAPSO is without a part, and other methods are.
+    """Return how much worse than PCA + SAPSO its variants and other methods are.
 
     Differences are paired by view and seed.
     """

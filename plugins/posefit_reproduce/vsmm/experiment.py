@@ -24,7 +24,7 @@ from posefit_vsmm.motion import library
 
 # number of films on which defaults were chosen
 TUNED = 5
-# frames that are tracked before, so that the times exclude compilation
+# frames that are tracked first, so that the times exclude compilation
 WARM_UP = 3
 # labels of activities; a jump does not occur in the film
 LABELS = ("walk", "arms-out", "jacks", "squat", "jump")

@@ -26,7 +26,7 @@ DISTORTIONS = (4, 5, 8, 12, 14)  # how many numbers OpenCV's lens models have
 BLOCK = 16  # pixels: codecs pad a picture's sides to a multiple of this
 HALF = 0.5  # pixels: files count the centre of the first pixel as 0, we as 0.5
 FULL_TURN = 2.0 * math.pi  # radians, and no rotation vector is longer
-SKEWED = 2e-3  # share of the focal length: a smaller skew changes nothing
+MAX_SKEW = 2e-3  # share of the focal length: a smaller skew changes nothing
 # shares of a picture's sides: a principal point lies in the middle half
 MIDDLE = 0.25, 0.75
 # Shares of a picture's sides. A principal point that is off the centre by more than
@@ -252,7 +252,7 @@ def stated(
             f"{quoted(matrix.tolist())}"
         )
     check_focal(np.diag(matrix)[:2], size or 2.0 * matrix[:2, 2])
-    if abs(matrix[0, 1]) > SKEWED * matrix[0, 0]:
+    if abs(matrix[0, 1]) > MAX_SKEW * matrix[0, 0]:
         raise InputError(
             f"a skew of {matrix[0, 1]:g} pixels, which is not read: calibrate without "
             "skew"

@@ -203,7 +203,7 @@ def _facts(content: Content) -> list[list[str]]:
 def _others(scene: Scene, frames: Sequence[Frame], origin: Array) -> dict[str, Any]:
     """Return the other likely poses: numbers of frames, weights and joints."""
     skeleton = scene.body.skeleton
-    places = []  # of the frames that have another likely pose
+    places = []  # numbers of the frames that have another likely pose
     weights = []
     joints = []
     for k, frame in enumerate(frames):

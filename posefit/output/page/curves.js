@@ -6,7 +6,7 @@ const MARKS = [
   ["unknown", "--other", "left and right unknown"],
   ["held", "--held", "pose held: too little is visible"],
 ].filter(([name]) => D.marks[name].length);
-const STRENGTHS = [0.85, 0.5, 0.25]; // of the bands, the narrowest first
+const STRENGTHS = [0.85, 0.5, 0.25]; // opacities of the bands, the narrowest first
 const cursors = new Map(); // from each box to the function that moves its line to a frame
 const seconds = (frame) => (D.first + frame * D.step) / D.fps;
 

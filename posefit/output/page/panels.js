@@ -1,8 +1,8 @@
 // The two views of a frame: a camera's picture with the body on it, and the body in 3D.
-const SURE = 0.05; // metres: a joint's 80 % interval, up to which a limb is drawn solid,
-const UNSURE = 0.3; // and from which on it is faintest
+const SURE = 0.05; // metres: up to this radius of a joint's 80 % interval a limb is drawn solid,
+const UNSURE = 0.3; // and from this radius on it is faintest
 const FAINTEST = 0.2; // how much of a faintest limb's colour is left
-const SOLID = 0.65; // of the picture that the body hides
+const SOLID = 0.65; // opacity of the body over the picture
 const CLOSE = 1.4; // height of a close-up, in heights of the body
 const CALM = 6; // frames to either side whose mean position a close-up is centred on
 const show = { frame: 0, camera: 0 };

@@ -50,7 +50,7 @@ class Strip:
 
     def __init__(self, room: int, step: int) -> None:
         self.pictures: list[tuple[Any, ...]] = []  # a box and its pictures
-        self.every = step  # of the frames, kept pictures show each `every`-th
+        self.every = step  # every `every`-th frame has a picture
         self._step = step
         self._room = room
         self._count = 0
@@ -104,7 +104,7 @@ class Stills:
         """Take the next frame."""
         number = self._count
         self._count += 1
-        # to find the person in the other frames of a long film would take minutes
+        # finding the person in the other frames of a long film would take minutes
         if number % self.step:
             return
         masks = [silhouette.mask for silhouette in observation.silhouettes]

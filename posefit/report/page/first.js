@@ -1,5 +1,5 @@
 // The first screen: all methods with their intervals, and failures.
-const MAX_METHODS = 12; // of the figure
+const MAX_METHODS = 12; // most methods of the figure
 
 // The lines of a text, broken at spaces to a width in pixels.
 function wrapped(text, room, weight) {
