@@ -94,8 +94,8 @@ class FitImageEnv(SearchEnv):
       held out. Numbers of the other split are refused.
     - `instance=None`: a number of the split; by default each reset draws one.
     - `yaw="guessed"`: the root's yaw is known to 20 degrees. "unknown": the person
-      faces anywhere, and the first coordinate spans 180 degrees to either side of facing
-      the first camera.
+      faces anywhere, and the first coordinate spans 180 degrees to either side
+      of facing the first camera.
     - `view_degrees=45.0`: where the camera is, 0 in front of the person; a list for
       several views.
     - `prior="pca"`, `train=None`: the prior, and the motions from which it learns; by
