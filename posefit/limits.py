@@ -214,9 +214,9 @@ _ARENA_MAX = -8  # glibc's number of this setting, M_ARENA_MAX in malloc.h
 def share_heap() -> None:
     """Let all threads of this process allocate from one heap, if the C library can.
 
-    glibc gives each thread a heap of its own and keeps there what the thread freed,
-    which is a tenth of the memory of a track. This is for whole programs: it changes
-    every later thread of the process.
+    glibc gives each thread a separate heap, and keeps freed memory in it, which is a
+    tenth of the memory of a track. This is for whole programs: it changes every later
+    thread of the process.
     """
     import ctypes
 

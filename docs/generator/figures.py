@@ -204,8 +204,9 @@ def page() -> str:
         "columns. "
         "The report's page and its data have every figure under the same name.",
         _table("column", [*_described(CELL), *_row_measures(), *_described(SPENT)]),
-        "A single search has `instance`, `evaluations`, `seed`, `name` and the last "
-        "ones, besides `key` to `settings`, and",
+        "A row of a single search has the columns from `key` to `settings`, then "
+        "`instance`, `evaluations`, `seed`, `name`, the last columns of the table "
+        "above, and",
         _table("column", _described({**SEARCH_CELL, **SEARCHED})),
         "## Columns of `leaderboard.csv`",
         "`posefit report DIR --figures FOLDER` writes one row per method in the order "

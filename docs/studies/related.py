@@ -45,13 +45,13 @@ WORSE = "mpjpe_mm"
 SLOWER = "cpu_seconds_per_frame"
 SENTENCES = (
     Sentence(
-        "a learned manifold has no way back in closed form",
+        "a learned manifold has no inverse in closed form",
         "sapso@isomap",
         "sapso@pca",
         WORSE,
     ),
     Sentence(
-        "a GPLVM is not continuous: poses between come out badly",
+        "a GPLVM is not continuous: intermediate poses are wrong",
         "sapso@gplvm",
         "sapso@pca",
         WORSE,
@@ -248,7 +248,7 @@ def verdicts(rows: Sequence[Row]) -> Iterator[str]:
             )
             cell = f"**{verdict}** {mean} ({interval})"
         lines.append([sentence.says, what, str(len(pairs)), cell])
-    heads = ["the paper says", "compared, above 0 if so", "n", "verdict"]
+    heads = ["the paper says", "difference, above 0 if true", "n", "verdict"]
     yield from markdown(heads, lines, words=4)
 
 

@@ -532,7 +532,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
 
     @abstractmethod
     def observe(self, rows: Rows) -> NDArray[Any]:
-        """Return the observations (m, ...) of some environments as they are now."""
+        """Return the current observations (m, ...) of some environments."""
 
     @abstractmethod
     def reset_infos(self) -> Infos:

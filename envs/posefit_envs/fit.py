@@ -44,7 +44,7 @@ class FitImageEnv(SearchEnv):
     `Box(-1, 1, (d,), float32)`: a proposal. With `prior="pca"` and a known translation,
     d = 9.
 
-    | Num | Meaning | Min and max stand for |
+    | Num | Meaning | -1 and 1 mean |
     |---|---|---|
     | 0, 1, 2 | root yaw, pitch, roll | 45, 15, 15 degrees to either side of a guess |
     | 3, 4, 5 | root translation if `translation="searched"` | 0.5 m around a guess |
@@ -94,8 +94,8 @@ class FitImageEnv(SearchEnv):
       held out. Numbers of the other split are refused.
     - `instance=None`: a number of the split; by default each reset draws one.
     - `yaw="guessed"`: the root's yaw is known to 20 degrees. "unknown": the person
-      faces anywhere, and the first number spans 180 degrees to either side of facing
-      the first camera.
+      faces anywhere, and the first coordinate spans 180 degrees to either side
+      of facing the first camera.
     - `view_degrees=45.0`: where the camera is, 0 in front of the person; a list for
       several views.
     - `prior="pca"`, `train=None`: the prior, and the motions from which it learns; by
@@ -217,7 +217,7 @@ class FitImageVectorEnv(SearchVectorEnv):
         self.stage.set_scenes(rows, first_scenes(self.world, numbers))
 
     def observe(self, rows: Rows) -> Image:
-        """Return the pictures of some environments as they are now."""
+        """Return the current pictures of some environments."""
         return self.stage.pictures(rows)
 
     def reset_infos(self) -> Infos:

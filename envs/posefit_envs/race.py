@@ -401,7 +401,7 @@ class RaceVectorEnv(SearchVectorEnv):
         self.races.evaluate_first(rows)
 
     def observe(self, rows: Rows) -> NDArray[np.float32]:
-        """Return the observations of some environments as they are now."""
+        """Return the current observations of some environments."""
         return self.races.observations()[rows]
 
     def reset_infos(self) -> Infos:

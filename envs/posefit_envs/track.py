@@ -260,7 +260,7 @@ class TrackVectorEnv(SearchVectorEnv):
         self.stage.set_scene(i, self._sequences[i].scene(problem))
 
     def observe(self, rows: Rows) -> Image:
-        """Return the pictures of some environments as they are now."""
+        """Return the current pictures of some environments."""
         return self.stage.pictures(rows)
 
     def reset_infos(self) -> Infos:

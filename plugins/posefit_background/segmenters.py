@@ -25,7 +25,7 @@ def learned_mixture(
     It is learned from the whole video.
 
     Settings:
-        history: Frames that it remembers, 1 or more.
+        history: Number of frames that the mixture remembers, 1 or more.
         threshold: Squared distance from the nearest Gaussian, in standard deviations,
             above which a pixel is foreground; above 0.
     """
@@ -52,8 +52,8 @@ def given_mean(film: Film, *, background: str) -> Still:
     """Each pixel's background is its mean over frames of the empty scene.
 
     Settings:
-        background: These frames as A:B, or the file of a picture of the empty scene;
-            `--background` sets it.
+        background: Frames of the empty scene as A:B, or the file of a picture of it;
+            `--background` sets this.
     """
     start, colon, stop = background.partition(":")
     if colon and (start + stop).isdigit() and stop:

@@ -265,7 +265,8 @@ def pycma(
     `spread`. When it stops, it starts again.
 
     Settings:
-        population_size (lambda): 5 or more, or 0 for the library's choice.
+        population_size (lambda): Size of a population, 5 or more, or 0 for the
+            library's choice.
         spread (sigma): First step size without a prediction, in half-ranges of the box,
             above 0. Ours.
     """

@@ -332,8 +332,8 @@ class HypothesisCosts:
 def motion_step_costs(spread: float, before: Hypotheses, after: Hypotheses) -> Array:
     """Return the costs (n, m) of steps between hypotheses of successive frames.
 
-    The trunk and each limb go on at their speed, at half of it, faster, or stop:
-    whatever costs least. The cost of a part is half the sum of two squares, and the
+    The trunk and each limb continue at their speed, at half of it, faster, or stop;
+    the cheapest counts. The cost of a part is half the sum of two squares, and the
     cost of its change of speed. The squares are those of the distance of its joints
     from where the mean of both rates leads, and of the difference of the rates. Both
     are in spreads, root mean square over all joints.

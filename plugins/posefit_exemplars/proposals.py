@@ -360,7 +360,7 @@ class HypothesisProposals:
         """Return the poses (n, 66) and places (n, 3) that fresh hypotheses begin at.
 
         They are the path, diverse states, and reflections of the likeliest hypotheses.
-        If there is an earlier track, its pose is added: as it is, with exchanged legs,
+        If there is an earlier track, its pose is added: unchanged, with exchanged legs,
         with exchanged arms, and with limbs of clips.
 
         Args:
@@ -412,8 +412,7 @@ class HypothesisProposals:
     ) -> list[PosesAndPlaces]:
         """Return the pose (66,) that an earlier track reported, and variants of it.
 
-        It comes as it is, with exchanged legs, with exchanged arms, and with limbs of
-        clips.
+        The variants have exchanged legs, exchanged arms, or limbs of clips.
         """
         pose = earlier_pose[None]
         place = earlier_place[None]
@@ -434,7 +433,7 @@ class HypothesisProposals:
     ) -> PosesAndPlaces:
         """Return a pose (1, 66) with the cheapest limbs, at its place (1, 3).
 
-        Each limb is the cheapest of its own and those of a few random poses of clips.
+        Each limb is the cheapest among the pose's own and a few random poses of clips.
         The motion of one arm says little about the other, so a few clips combine to
         many gestures, as in the crossover of Deutscher and Reid (2005).
         """

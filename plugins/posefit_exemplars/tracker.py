@@ -27,9 +27,9 @@ class ExemplarTracker:
     """Follows the likeliest path through recorded clips (Toyama and Blake, 2001).
 
     Settings:
-        spread: Distance of joints from where a clip continues, metres, rms, for a
-            thirtieth of a second; above 0.
-        temperature: Divides silhouette costs; above 0. The default is more than 1,
+        spread: Root mean square distance of joints from the continuation of a clip, in
+            metres for a thirtieth of a second; above 0.
+        temperature: Divisor of silhouette costs, above 0. The default is more than 1,
             because the errors of successive frames are correlated.
         lag: Number of later frames used before a pose is reported, 0 or more.
         smoothing: Standard deviation of the smoothing over time, thirtieths of a

@@ -29,8 +29,8 @@ class Loose:
     skeleton's joint limits if the skeleton states some.
 
     Settings:
-        components (m): A whole number of them, or the least share of the variance that
-            they must retain, below 1. As `pca`.
+        components (m): Number of components, or the least share of the variance that
+            they must retain, below 1. As in `pca`.
         arms_degrees: How far shoulders and elbows may deviate from the components, to
             either side, 0 or more. Ours.
         legs_degrees: How far hips and knees may deviate from the components, to either

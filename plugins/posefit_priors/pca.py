@@ -35,7 +35,7 @@ class PCA(Components):
     nearest cluster.
 
     Settings:
-        components (m): A whole number of them, or the least share of the variance that
+        components (m): Number of components, or the least share of the variance that
             they must retain, below 1. Section 2.1.
         clusters (K): Number of centres that K-means finds among the training poses, 1
             or more. Section 2.2.

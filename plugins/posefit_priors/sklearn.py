@@ -43,8 +43,8 @@ class Transformed:
 
     Settings:
         variant: The class, such as KernelPCA; `sklearn:NAME` sets it.
-        components (m): Its `n_components`, 1 or more.
-        options: Its other parameters, as a JSON object.
+        components (m): The transformer's `n_components`, 1 or more.
+        options: Other parameters of the transformer, as a JSON object.
     """
 
     low: Array  # (m,)

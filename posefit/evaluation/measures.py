@@ -177,8 +177,8 @@ class Measures:
         "mm a step",
         0,
         "distance that a standing foot moves along the ground, the mean over steps: "
-        "about 20 in motion capture; a foot stands while the true foot does, or while "
-        "it is low and slow if the truth is unknown",
+        "about 20 in motion capture; the true motion decides when a foot stands or, if "
+        "the truth is unknown, a foot that is low and slow counts as standing",
     )
     held_frames: int = _figure(
         "held",

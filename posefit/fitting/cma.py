@@ -215,8 +215,8 @@ class CMAES:
     towards the best proposal.
 
     Settings:
-        population_size (lambda): 5 or more, or 0 for 4 + 3 ln d, at least 5. Hansen
-            2016.
+        population_size (lambda): Size of a population, 5 or more, or 0 for 4 + 3 ln d,
+            at least 5. Hansen 2016.
         spread (sigma): The initial step size without a prediction, in half-ranges of
             the box, above 0. Ours.
     """

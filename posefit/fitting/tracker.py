@@ -42,7 +42,7 @@ SPREAD = 1.0
 FLOOR = 0.05
 HISTORY_FRAMES = 3  # frames that a prediction looks back
 TILT_SHARE = 0.99  # ours: the search covers the tilts of this share of training poses
-TILT_MARGIN_DEGREES = 5.0  # ours: about the difference between people who stand
+TILT_MARGIN_DEGREES = 5.0  # ours: about the difference between standing people
 RELOCALISE_GAP = 5  # frames without the person, about a sixth of a second. Ours
 # Key in the details of a frame: the coordinates (d,) of its pose in the search space.
 COORDINATES = "coordinates"

@@ -36,7 +36,7 @@ def acceleration(joints: Array, fps: float) -> Array:
 
 
 def standing(joints: Array, fps: float) -> NDArray[np.bool_]:
-    """Return whether the left and the right foot stand (T, 2).
+    """Return whether the left and the right foot are on the ground (T, 2).
 
     A foot stands if it is slow and low for at least a tenth of a second. It is low if
     it is less than 5 cm above the lowest place of both feet within a second. y is up.

@@ -85,7 +85,7 @@ def write_pictures(paths: Mapping[str, Path], content: Content) -> list[str]:
     """Write the video, the summary and the page in one pass through the footage.
 
     Args:
-        paths: Where to write those that are wanted, by `mp4`, `png` and `html`.
+        paths: The path of each requested file, by `mp4`, `png` and `html`.
         content: The data of the track.
 
     Returns:

@@ -167,8 +167,8 @@ class Runs:
         data: The other data of each row, by the names of `Kind.data`.
         warnings: The warnings of each row that has some, by its index.
         failures: The quarantined cells.
-        chosen: The JSON texts of the fields that define each method of the report, also
-            of those that only failed.
+        chosen: The JSON texts of the fields that define each method of the report, even
+            if all its cells failed.
     """
 
     kind: Kind

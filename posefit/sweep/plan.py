@@ -175,7 +175,7 @@ def _tracks(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
         used: set[str] = set()
         for spec in chain(_product(lists), single):
             method = spec.get("method", defaults.get("method"))
-            # a method gets those of the shared settings that it has
+            # a method gets the shared settings that it has
             settings = {}
             if shared and isinstance(method, str):
                 settings = _of_families(shared, families(method))
@@ -216,7 +216,7 @@ def _track_lists(tables: Mapping[str, Any]) -> dict[str, Sequence[Any]]:
 
 
 def _of_families(settings: Mapping[str, Any], names: Sequence[str]) -> dict[str, Any]:
-    """Return those of some settings, NAME.SETTING, that begin with one of the NAMEs."""
+    """Return the settings, NAME.SETTING, whose NAME is one of the names."""
     chosen = {}
     for setting, value in settings.items():
         if setting.partition(".")[0] in names:

@@ -1,6 +1,6 @@
 """The shards of a plan: parts of a sweep that machines run independently.
 
-Each shard I/N has a ledger of its own in the same folder.
+Each shard I/N has a separate ledger in the same folder.
 """
 
 import re

@@ -268,7 +268,7 @@ def relocalised(
 
     This happens in the first frame that shows the person after a gap: they may have
     turned unseen. It also happens if all costs of half a second are half as high again
-    as is typical since the last relocalisation. The restarts and the track as it is are
+    as is typical since the last relocalisation. The restarts and the present track are
     compared over about a second of the coming observations, and the cheapest one
     continues. The frame gets the evaluations and the time of all that were compared.
 

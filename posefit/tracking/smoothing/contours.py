@@ -174,7 +174,7 @@ def fit_contours(
     Several cameras are turned a little from their calibrations. In a long track, the
     build and the cameras are fitted in the window with most usable frames. A result
     that costs more than its start is discarded. A motion of fewer than 3 frames is
-    returned as it is.
+    returned unchanged.
 
     Args:
         scene: The scene.

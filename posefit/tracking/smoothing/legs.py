@@ -4,7 +4,7 @@ From the side, two legs that pass each other look like two legs that meet and go
 and a track may confuse the two. But if legs go back, or are exchanged in
 the middle of a stride, the body leaves the masks once its motion is smooth. So trials
 exchange the legs from each doubtful frame on. The costs of these trials, and of each
-stretch between them as it is and exchanged, give the cheapest sequence of exchanges.
+stretch between them unchanged and exchanged, give the cheapest sequence of exchanges.
 Most films need no trial, because exchanged legs cost more everywhere than an exchange
 could save.
 """

@@ -134,7 +134,7 @@ MAX_STANCE_GAP_SECONDS = 0.07  # shorter gaps in a stance are closed
 
 
 def standing_feet(joints: Array, fps: float, viewpoints: Array) -> NDArray[np.bool_]:
-    """Return whether the left and the right foot stand (T, 2).
+    """Return whether the left and the right foot are on the ground (T, 2).
 
     A standing foot is low, and slow compared with the root, which a walk moves ahead.
 
@@ -149,11 +149,11 @@ def standing_feet(joints: Array, fps: float, viewpoints: Array) -> NDArray[np.bo
     sights = (joints[:, 0] - viewpoints)[:, [0, 2]]
     speed, root = (_speeds(places, sights, fps) for places in (feet, joints[:, :1]))
     slow = speed < np.maximum(STANDING_SPEED, STANDING_SPEED_SHARE * root)
-    stands = slow & low(feet, fps, STRIDE_SECONDS, STANDING_HEIGHT)
+    standing = slow & low(feet, fps, STRIDE_SECONDS, STANDING_HEIGHT)
     for side in range(2):
-        bridged = ~_without_short(~stands[:, side], MAX_STANCE_GAP_SECONDS * fps)
-        stands[:, side] = _without_short(bridged, MIN_STANCE_SECONDS * fps)
-    return np.asarray(stands)
+        bridged = ~_without_short(~standing[:, side], MAX_STANCE_GAP_SECONDS * fps)
+        standing[:, side] = _without_short(bridged, MIN_STANCE_SECONDS * fps)
+    return np.asarray(standing)
 
 
 def _speeds(places: Array, sights: Array, fps: float) -> Array:
@@ -235,7 +235,7 @@ def smooth_path(motion: Motion, visibility: Visibility) -> Motion:
     """Return a motion with a smooth path of the root and planted feet.
 
     Only the root's path and the angles of the legs change. A motion of fewer than 3
-    frames is returned as it is.
+    frames is returned unchanged.
     """
     if len(motion) < 3:
         return motion
@@ -253,12 +253,12 @@ def smooth_path(motion: Motion, visibility: Visibility) -> Motion:
         part = replace(
             motion, poses=motion.poses[rows], translations=motion.translations[rows]
         )
-        stands = np.zeros((len(part), 2), dtype=bool)
+        standing = np.zeros((len(part), 2), dtype=bool)
         visible = visibility.at(rows)
-        # first without standing feet: a smooth root shows which foot stands
-        smooth = _solved(part, visible, stands)
-        stands = standing_feet(smooth.joints, smooth.fps, visible.viewpoints)
-        smooth = _solved(part, visible, stands)
+        # first without standing feet: a smooth root shows which feet stand still
+        smooth = _solved(part, visible, standing)
+        standing = standing_feet(smooth.joints, smooth.fps, visible.viewpoints)
+        smooth = _solved(part, visible, standing)
         poses[rows[inner]] = smooth.poses[inner]
         places[rows[inner]] = smooth.translations[inner]
     return replace(motion, poses=poses, translations=places)
@@ -280,9 +280,9 @@ def windows_over(
 
 
 def _solved(
-    motion: Motion, visibility: Visibility, stands: NDArray[np.bool_]
+    motion: Motion, visibility: Visibility, standing: NDArray[np.bool_]
 ) -> Motion:
-    """Return the motion with the least sum of squares, given which feet stand."""
+    """Return the motion with the least sum of squares, given standing feet."""
     angles = [angle for angle in LEGS if motion.skeleton.free[angle]]
     root = slice(0, 3)
     legs = slice(3, 3 + len(angles))
@@ -299,7 +299,7 @@ def _solved(
         )
         squares.add_bends(legs, change[:, legs], motion.fps**2 / LEG_ACCELERATION)
         add_standing(
-            squares, replace(motion, poses=poses, translations=places), stands, angles
+            squares, replace(motion, poses=poses, translations=places), standing, angles
         )
         change = change - squares.least()
         poses[:, angles] = motion.poses[:, angles] + change[:, 3:]
@@ -349,9 +349,9 @@ def add_root(
 
 
 def add_standing(
-    squares: Squares, motion: Motion, stands: NDArray[np.bool_], angles: Sequence[int]
+    squares: Squares, motion: Motion, standing: NDArray[np.bool_], angles: Sequence[int]
 ) -> None:
-    """Add the squares of the steps of feet that stand (T, 2) in a motion.
+    """Add the squares of the steps of standing feet (T, 2) in a motion.
 
     The numbers of each frame are the root's place and some `angles`.
     """
@@ -371,5 +371,5 @@ def add_standing(
         derivatives[..., columns] = np.moveaxis(
             (there[:, :, ball] - feet) / ANGLE_DIFFERENCE, 0, 2
         )
-        both = np.flatnonzero(stands[:-1, side] & stands[1:, side])
+        both = np.flatnonzero(standing[:-1, side] & standing[1:, side])
         squares.add_steps(both, feet, derivatives, motion.fps / (30.0 * STANDING_SLIDE))

@@ -1,10 +1,10 @@
 """Legs of people who stand in front of one camera, as straight as the masks allow.
 
-A silhouette does not show how far a leg reaches towards the camera, so that the
-tracker bends knees as the people of the library do. They seem to stand with bent knees,
-because bones of recorded skeletons are a little too long for the distance from hip to
-ankle (docs/measured/footage.md). If straighter legs explain the masks as well, once
-the person is moved away from the camera to match, they are kept.
+A silhouette does not show how far a leg reaches towards the camera, so the tracker
+bends knees as in the library. There, even standing people have bent knees, because
+bones of recorded skeletons are a little too long for the distance from hip to ankle
+(docs/measured/footage.md). If straighter legs explain the masks as well, once the
+person is moved away from the camera to match, they are kept.
 """
 
 from collections.abc import Sequence
@@ -23,13 +23,13 @@ from posefit.tracking.smoothing.path import Visibility, standing_feet
 from posefit.tracking.smoothing.smooth import Smoothed, moved, smooth
 from posefit.tracking.trajectory import mean_cost
 
-# Longer than a foot stands in a walk, which is 0.6 to 0.7 seconds.
+# Longer than the stance of a walk, which takes 0.6 to 0.7 seconds.
 STANDING_SECONDS = 0.8
-# How much nearer the ankle is to the hip in the library than in people who stand, as a
-# share: half of its people stand with knees bent by 28 degrees or more
-# (docs/studies/knees.py --library).
+# How much nearer the ankle of a standing person is to the hip in the library than in
+# reality, as a share: half of the library's people keep their knees bent by 28 degrees
+# or more (docs/studies/knees.py --library).
 NEARER = 0.03
-# Radians: people stand with knees that are bent by 0 to 5 degrees (Perry and Burnfield,
+# Radians: knees of standing people are bent by 0 to 5 degrees (Perry and Burnfield,
 # Gait Analysis, Normal and Pathological Function, 2nd edition, 2010).
 STRAIGHT = np.radians(5.0)
 # Factor on the mean cost of masks. Straighter legs that cost more are wrong: the masks
@@ -55,38 +55,39 @@ def with_straight_legs(
         borders: The borders of the scene's masks.
     """
     free = tracked.scene.body.skeleton.free
-    stands = standing_long(smoothed)
+    standing = standing_long(smoothed)
     # the legs of a given skeleton may have other axes
-    if not free[FLEXIONS].all() or not stands.any():
+    if not free[FLEXIONS].all() or not standing.any():
         return tracked.frames, smoothed
     straight = list(tracked.frames)
-    for k in np.flatnonzero(stands).tolist():
+    for k in np.flatnonzero(standing).tolist():
         straight[k] = _straighter(tracked.scene, k, straight[k])
     again = smooth(tracked.scene, straight, tracked.shape, beta, borders)
-    before, after = (mean_cost(result.frames, stands) for result in (smoothed, again))
+    before, after = (mean_cost(result.frames, standing) for result in (smoothed, again))
     if after > EQUAL_COST * before:
         return tracked.frames, smoothed
     return straight, again
 
 
 def standing_long(smoothed: Smoothed) -> NDArray[np.bool_]:
-    """Return the usable frames (T,) in which a foot stands longer than in a walk."""
+    """Return the usable frames (T,) of stances that are longer than in a walk."""
     scene = smoothed.scene
     visibility = Visibility.of(scene)
     motion = scene.motion(smoothed.frames)
     feet = standing_feet(motion.joints, motion.fps, visibility.viewpoints)
-    stands = np.zeros(len(motion), dtype=bool)
+    standing = np.zeros(len(motion), dtype=bool)
     for foot in feet.T:
         for start, stop in runs(foot):
             if stop - start >= STANDING_SECONDS * motion.fps:
-                stands[start:stop] = True
-    return stands & visibility.usable
+                standing[start:stop] = True
+    return standing & visibility.usable
 
 
 def _straighter(scene: Scene, k: int, frame: Frame) -> Frame:
-    """Return frame k with straighter legs, and as much farther away as they are longer.
+    """Return frame k with straighter legs, moved away from the camera to match.
 
-    The place changes as the one does that fills the silhouettes' boxes.
+    The person moves by the difference of the two places, before and after, at which
+    the body fills the silhouettes' boxes.
     """
     pose = straightened(scene.body.skeleton, frame.pose)
     places = align(
