@@ -8,12 +8,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
+from posefit.footage.choice import Choice
+
 if TYPE_CHECKING:
     from posefit.fitting.optimiser import OptimiserFactory
     from posefit.fitting.prior import Prior
     from posefit.fitting.space import Translation
     from posefit.fitting.tracker import TrackerFactory
-    from posefit.footage.choice import Choice
     from posefit.footage.extraction import Extraction
     from posefit.footage.options import OneCamera
     from posefit.footage.views import Range
@@ -37,7 +38,7 @@ class _Keywords(TypedDict, total=False):
     label: int | None
     category: str | None
     holes: float | None
-    person: "Choice | None"
+    person: Choice | None
     method: "str | TrackerFactory | tuple[str | OptimiserFactory, str | Prior] | None"
     settings: Mapping[str, Any] | Sequence[str]
     train: "Sequence[Source]"

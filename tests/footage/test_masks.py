@@ -231,7 +231,7 @@ def test_an_edge_between_two_values_is_no_label(
         (["PICTURES"], "pictures: expected masks, got pictures in many colours"),
         (
             ["EMPTY"],
-            "empty: expected a mask with a person and a background, got an empty one first, and no other",
+            "empty: expected a mask with a person and a background, got an empty one first, and none with both in",
         ),
         (["SIZES"], "0001.png: mask must have shape (120, 160), got (60, 80)"),
     ],

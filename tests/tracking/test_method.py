@@ -21,7 +21,7 @@ from posefit.progress import Progress
 from posefit.registry import Offer, Plugin, Registry, registry
 from posefit.silhouette import sharing
 from posefit.testing.toy import Toy, sphere
-from posefit.tracking import defaults, method
+from posefit.tracking import defaults, front, method
 from posefit.tracking.defaults import completed
 from posefit.tracking.options import TrackOptions
 from posefit_envs import world
@@ -160,6 +160,7 @@ def test_a_prior_that_moves_fixed_axes_is_refused_wherever_it_is_used(
     )
     installed("prior", planted.MovesFixedAxes)
     monkeypatch.setattr(world, "registry", method.registry)
+    monkeypatch.setattr(front, "registry", method.registry)
     motion = built_in.motion("walk", frames=1)
     scene = synthetic(motion, [45.0], (120, 90), [], (None, None))
     out = tmp_path / "out"
