@@ -224,21 +224,23 @@ def in_doubt(
     sums = np.append(0.0, np.cumsum(excess))
     near = sums[last] - sums[first]
     until = np.append(0.0, np.cumsum(added))[ends]
-    # A stretch may be better if what its exchange adds, `until` its end less `until`
-    # its start, is less than the excess near both.
+    # An exchange from edge a to a later edge b adds until[b] - until[a] to the costs, and
+    # saves at most near[a] + near[b]. It may be better if it adds less than it saves:
+    # until[b] - near[b] < until[a] + near[a], so that each side belongs to one edge.
     opening = until + near
     closing = until - near
     better = np.zeros(len(ends), dtype=bool)
     apart = 1
-    # frames that are near both ends of a short stretch count once
+    # Frames that are near both ends of a short stretch are in both sums, and must count
+    # once. So all edges are compared with those that come next, until none is so near.
     while (last[:-apart] > first[apart:]).any():
         shared = np.maximum(sums[last[:-apart]] - sums[first[apart:]], 0.0)
         saves = closing[apart:] + shared < opening[:-apart]
         better[:-apart] |= saves
         better[apart:] |= saves
         apart += 1
-    # For longer stretches it is enough to compare each end with the best one after it,
-    # and with the best one before it.
+    # Long stretches share no frames, so it is enough to compare each edge with the best
+    # of all later ones, and with the best of all earlier ones.
     least = np.minimum.accumulate(closing[::-1])[::-1]
     better[:-apart] |= least[apart:] < opening[:-apart]
     most = np.maximum.accumulate(opening)
