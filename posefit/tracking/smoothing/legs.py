@@ -224,9 +224,10 @@ def in_doubt(
     sums = np.append(0.0, np.cumsum(excess))
     near = sums[last] - sums[first]
     until = np.append(0.0, np.cumsum(added))[ends]
-    # An exchange from edge a to a later edge b adds until[b] - until[a] to the costs, and
-    # saves at most near[a] + near[b]. It may be better if it adds less than it saves:
-    # until[b] - near[b] < until[a] + near[a], so that each side belongs to one edge.
+    # An exchange from edge a to a later edge b adds until[b] - until[a] to the costs,
+    # and saves at most near[a] + near[b]. It may be better if it adds less than it
+    # saves: until[b] - near[b] < until[a] + near[a], so that each side belongs to one
+    # edge.
     opening = until + near
     closing = until - near
     better = np.zeros(len(ends), dtype=bool)
