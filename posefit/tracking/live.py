@@ -108,7 +108,7 @@ def track_live(
         value = getattr(chosen, each.name)
         if not declared(each).live and value != each.default:
             raise InputError(f"{each.name} must be left out with live, got {value}")
-    # nor can people be told apart before all frames are known, whoever asks for one
+    # an extraction may choose a person too, and people are not distinguished live
     if chosen.extraction is not None and chosen.extraction.person is not None:
         person = chosen.extraction.person
         raise InputError(f"person must be left out with live, got {person}")

@@ -284,7 +284,16 @@ def _smoothed(
             f"legs exchanged in {exchanged.sum()} frames,"
             " where the smoothed track then fits better"
         )
-    return smoothed
+    straighter = sum(
+        frame is not other for frame, other in zip(frames, tracked.frames, strict=True)
+    )
+    if not straighter:
+        return smoothed
+    # the masks fit as well without, so readers of knee angles must know
+    guess = f"straighter legs in {straighter} frames in which the person stands"
+    scene = smoothed.scene
+    scene = replace(scene, guesses=[*scene.guesses, guess])
+    return smoothed._replace(scene=scene)
 
 
 def track_hypotheses(

@@ -8,11 +8,13 @@ import pytest
 
 from posefit.arrays import Array
 from posefit.fitting.cost import align
-from posefit.fitting.tracker import Frame, Observation
+from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import Scene, synthetic
 from posefit.geometry.skeleton import BONES, JOINTS
 from posefit.motion import built_in
+from posefit.progress import QUIET
 from posefit.silhouette.cost import BETA
+from posefit.tracking import pipeline
 from posefit.tracking.smoothing.contours import Borders
 from posefit.tracking.smoothing.smooth import Smoothed, smooth
 from posefit.tracking.smoothing.standing import (
@@ -147,6 +149,17 @@ def test_a_person_seen_from_the_front_stands_straight() -> None:
     assert kept is not frames
     assert before.mean() > 18.0
     assert after.mean() < 12.0
+
+
+def test_straighter_legs_are_a_guess_that_the_track_names() -> None:
+    for yaw, bent, expected in ((0.0, 25.0, 1), (np.pi / 2.0, 30.0, 0)):
+        scene = standing(5.0 if expected else bent, yaw)
+        frames = guessed(scene, bent) if expected else exact_frames(scene)
+        tracked = Smoothed(filmed(scene), frames, None)
+        task = Task(scene.body, scene.cameras, 400, yaw=yaw, anchor=np.zeros(3))
+        result = pipeline._smoothed(tracked, task, BETA, QUIET)
+        named = [guess for guess in result.scene.guesses if "straighter legs" in guess]
+        assert len(named) == expected
 
 
 def test_knees_that_masks_show_bent_stay_bent() -> None:

@@ -1,7 +1,7 @@
 """Poses, path and build fitted to the contours of masks, over all frames at once.
 
 A tracker's estimate is one of its known poses, and it jitters because each frame is
-searched anew. Here least squares adjust every angle a little, and smoothly, to the
+searched by itself. Here least squares adjust every angle a little, and smoothly, to the
 contours of the masks. The build, and small turns of several cameras, are fitted too.
 They are the same in all frames.
 """
