@@ -9,7 +9,8 @@
 | priors: poses as fewer numbers, their feasibility, the tilt of the root | prior.py |
 | the cost of proposals for one observation, and aligning a body with it | cost.py |
 | optimisers, and the base of adapters of other libraries | optimiser.py |
-| trackers; one search per frame around a prediction. SAPSO section 4 | tracker.py |
+| what trackers get and return | tracker.py |
+| one search per frame around a prediction. SAPSO section 4 | synthesis.py |
 | weights of costs, and their effective number of samples | weights.py |
 | errors against a truth. SAPSO (8)-(10) | metrics.py |
 | the likelihood of a detector's landmarks | landmarks.py |
@@ -17,7 +18,8 @@
 | the loop that drives a tracker, and the audit of its frames | driving.py |
 | the build of one person, fitted with the poses | shape.py |
 | costs of many bodies in many frames, in one call | bodies.py, body_kernels.py |
-| one frame fitted to the contours of its masks | contours.py, contour_kernels.py |
+| bodies fitted to the contours of masks | contours.py, contour_kernels.py |
+| the same, compiled: one bone, one body | contour_residuals.py, contour_twists.py |
 | CMA-ES | cma.py |
 | aligning and decoding, compiled | kernels.py |
 | checks of settings; arrays of other libraries | check.py, dlpack.py |

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
 from posefit.fitting import contour_kernels as kernels
+from posefit.fitting.contour_twists import Growth, Sums
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera, stacked
@@ -146,8 +147,8 @@ class MaskContours:
         body: Body,
         frames: Array,
         scale: float,
-        grown: kernels.Growth,
-        sums: kernels.BoneSquares,
+        growth: Growth,
+        sums: Sums,
     ) -> None:
         """Add the squared distances between these borders and the borders of bodies.
 
@@ -167,7 +168,7 @@ class MaskContours:
             frames,
             contours,
             scale,
-            grown,
+            growth,
             sums,
         )
 
@@ -232,21 +233,21 @@ def _between(mask: Mask, around: Mask) -> Array:
     return np.column_stack([columns + 1.0, rows + 0.5])
 
 
-def _free_numbers(skeleton: Skeleton) -> Integers:
-    """Return the indices of the numbers of a place and a pose that may change."""
+def _free_indices(skeleton: Skeleton) -> Integers:
+    """Return the indices of the degrees of freedom of a frame that may change."""
     return np.flatnonzero(np.append([True] * 3, skeleton.free))
 
 
 class ContourSquares(NamedTuple):
     """Half the Hessians and gradients of the squared distances between borders.
 
-    The derivatives are with respect to n numbers of each frame, the root's place and
-    the free angles, and to F factors that all frames share.
+    The derivatives are with respect to the n free degrees of freedom of each frame, the
+    root's place and angles, and to F factors that all frames share.
     """
 
     hessians: Array  # (T, n, n)
     gradients: Array  # (T, n)
-    mixed: Array  # (T, n, F) second derivatives by numbers and factors
+    mixed: Array  # (T, n, F) second derivatives by both
     factor_hessian: Array  # (F, F) over all frames
     factor_gradient: Array  # (F,)
 
@@ -257,7 +258,7 @@ def contour_squares(
     poses: Array,
     places: Array,
     scale: float,
-    grown: Sequence[tuple[Array, Array]] = (),
+    growth: Sequence[Growth] = (),
 ) -> ContourSquares:
     """Return the squared distances between the borders of masks and of a body.
 
@@ -268,33 +269,39 @@ def contour_squares(
         poses: Poses (T, 66).
         places: Places (T, 3).
         scale: metres. Larger distances count less.
-        grown: For each view, the derivatives of joints (T, F, 27, 3) and radii
-            (F, 26, 2) by the factors. If it is empty, there are no factors.
+        growth: For each view, the derivatives of joints and radii by the factors. If it
+            is empty, there are no factors.
 
     Returns:
         The halved Hessians and gradients of the squares.
     """
     skeleton = body.skeleton
     count = len(poses)
-    if not grown:
+    if not growth:
         no_joints = np.empty((count, 0, len(JOINTS), 3))
         no_radii = np.empty((0, len(BONES), 2))
-        grown = [(no_joints, no_radii)] * len(views)
-    factors = len(grown[0][1])
-    placed = skeleton.frames(poses, places)
-    squares = np.zeros((1 + factors, 1 + factors))
-    sums = kernels.BoneSquares(
+        growth = [Growth(no_joints, no_radii)] * len(views)
+    factors = len(growth[0].radii)
+    sums = Sums(
         hessians=np.zeros((count, len(JOINTS), 6, 6)),
         forces=np.zeros((count, len(JOINTS), 6, 1 + factors)),
+        factors=np.zeros((1 + factors, 1 + factors)),
     )
-    for view, (joints, radii) in zip(views, grown, strict=True):
-        view.add(body, placed[0], scale, kernels.Growth(joints, radii, squares), sums)
-    free = _free_numbers(skeleton)
+    frames, sines, cosines = skeleton.frames(poses, places)
+    for view, by_factor in zip(views, growth, strict=True):
+        view.add(body, frames, scale, by_factor, sums)
+    free = _free_indices(skeleton)
     hessians = np.empty((count, len(free), len(free)))
     gradients = np.empty((count, len(free), 1 + factors))
-    kernels.add_all_bones(skeleton.chain, placed, sums, free, (hessians, gradients))
+    kernels.composite_hessians(
+        skeleton.chain, frames, sines, cosines, sums, free, hessians, gradients
+    )
     return ContourSquares(
-        hessians, gradients[..., 0], gradients[..., 1:], squares[1:, 1:], squares[1:, 0]
+        hessians,
+        gradients[..., 0],
+        gradients[..., 1:],
+        sums.factors[1:, 1:],
+        sums.factors[1:, 0],
     )
 
 
@@ -319,21 +326,21 @@ def fitted(
         scales: Metres, one for each step. Larger distances count less.
         threads: Number of threads. Does not change the result.
     """
-    free = _free_numbers(body.skeleton)
+    free = _free_indices(body.skeleton)
     poses = writeable(start[0].copy())
     places = writeable(start[1].copy())
     count_poses(STEP_EVALUATIONS * len(views) * len(poses) * len(scales))
     targets = np.concatenate([start[1], means], axis=1)[:, free]
     borders = _of_one_frame(views)
-    reaches = np.array(scales, dtype=np.float64)
+    scale_array = np.array(scales, dtype=np.float64)
 
     def fit(part: slice) -> None:
         kernels.fit_poses(
             body.skeleton.chain,
             body.radii,
             borders,
-            kernels.Pulls(free, targets[part], precisions[free]),
-            reaches,
+            kernels.Prior(free, targets[part], precisions[free]),
+            scale_array,
             MAX_ANGLE_STEP,
             poses[part],
             places[part],

@@ -58,8 +58,12 @@ def test_the_tests_that_the_page_of_items_names_are_there() -> None:
 
 def test_each_equation_of_the_contour_fit_is_tagged_in_its_kernels() -> None:
     page = ROOT / "docs" / "background" / "contour-fit.md"
-    kernels = ROOT / "posefit" / "fitting" / "contour_kernels.py"
+    modules = (ROOT / "posefit" / "fitting").glob("contour_*.py")
     equations = re.findall(r"\\tag\{(\d+)\}", page.read_text("utf-8"))
-    tags = re.findall(r"\bcontour \((\d+)\)", kernels.read_text("utf-8"))
+    tags = [
+        tag
+        for module in modules
+        for tag in re.findall(r"\bcontour \((\d+)\)", module.read_text("utf-8"))
+    ]
     assert equations == [str(k + 1) for k in range(len(equations))]
     assert set(tags) == set(equations)

@@ -8,7 +8,8 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from posefit.arrays import Array
-from posefit.fitting import contour_kernels as kernels
+from posefit.fitting import contour_residuals as residuals
+from posefit.fitting import contour_twists as twists
 from posefit.fitting.contours import (
     MaskContours,
     coarseness,
@@ -101,12 +102,12 @@ def cone_distance(
     x: float, y: float, points: Array, radii: Array
 ) -> tuple[float, float, float, float]:
     """Return how far a point is outside the cone of two discs, at which share of it, and its normal."""
-    cones = np.empty((1, kernels.CONE))
+    cones = np.empty((1, residuals.CONE))
     discs = np.empty((1, 3))
-    kernels.write_cones(
+    residuals.write_cones(
         np.zeros(1, int), np.asarray(points), np.asarray(radii)[None], cones, discs
     )
-    distance, *others = kernels.cone_distance(x, y, kernels.cone_of(cones, 0))
+    distance, *others = residuals.cone_distance(x, y, residuals.cone_of(cones, 0))
     return distance, *others
 
 
@@ -120,14 +121,18 @@ def drawn_body(body: Body, camera: Camera, joints: Array) -> Array:
     return np.concatenate([pixels.ravel(), radii.ravel()])
 
 
-def pulled(numbers: Array, mask: kernels.Contour, scale: float) -> tuple[Array, Array]:
+def pulled(
+    numbers: Array, mask: residuals.Contour, scale: float
+) -> tuple[Array, Array]:
     """Return half the second derivatives (106, 106) and half the gradient (106,) by the numbers of a drawn body."""
     centres, radii = (
         part.reshape(-1, 2) for part in np.split(numbers, [2 * len(JOINTS)])
     )
     blocks = np.zeros((len(BONES), 6, 6))
     forces = np.zeros((len(BONES), 6))
-    kernels.accumulate_borders(BONE_STARTS, centres, radii, mask, scale, blocks, forces)
+    residuals.accumulate_borders(
+        BONE_STARTS, centres, radii, mask, scale, blocks, forces
+    )
     curves = np.zeros((COUNT, COUNT))
     slopes = np.zeros(COUNT)
     for b, parent in enumerate(BONE_STARTS):
@@ -152,7 +157,7 @@ def pull_of_view(
     """
     root = coarseness(view.camera, place[None])[0][0]  # pixels per metre
     points = np.ascontiguousarray(view.points[view.starts[k] : view.starts[k + 1]])
-    mask = kernels.Contour(
+    mask = residuals.Contour(
         view.fields[k],
         view.corners[k],
         view.sizes[k],
@@ -160,9 +165,9 @@ def pull_of_view(
         view.step,
         np.full(len(points), -1),
     )
-    curves, slopes = pulled(here, mask, max(reach * root, kernels.MIN_ROBUST_SCALE))
-    deviation = kernels.BORDER_DEVIATION**2 + (kernels.PIXEL_DEVIATION / root) ** 2
-    worth = 1.0 / (root**3 * kernels.CORRELATION_LENGTH * deviation)
+    curves, slopes = pulled(here, mask, max(reach * root, twists.MIN_ROBUST_SCALE))
+    deviation = twists.BORDER_DEVIATION**2 + (twists.PIXEL_DEVIATION / root) ** 2
+    worth = 1.0 / (root**3 * twists.CORRELATION_LENGTH * deviation)
     ways = (there - here).T / STEP
     return worth * ways.T @ curves @ ways, worth * ways.T @ slopes
 
@@ -303,7 +308,7 @@ def test_the_gradient_of_the_border_points_is_that_of_their_squares() -> None:
         body.skeleton.joints(np.zeros((1, 66)), np.array([[0.0, 0.9, 0.0]]))[0],
     )
     points = rng.uniform(40.0, 160.0, (30, 2))
-    mask = kernels.Contour(
+    mask = residuals.Contour(
         np.zeros((1, 1), np.float32),
         np.zeros(2, np.int64),
         np.ones(2, np.int64),
@@ -374,7 +379,7 @@ def test_the_pull_of_a_bone_equals_the_sum_over_its_whole_border() -> None:
     ) -> tuple[np.ndarray, np.ndarray]:
         blocks = np.zeros((len(parents), 6, 6))
         forces = np.zeros((len(parents), 6))
-        mask = kernels.Contour(
+        mask = residuals.Contour(
             field,
             np.zeros(2, int),
             np.array(field.shape),
@@ -382,7 +387,7 @@ def test_the_pull_of_a_bone_equals_the_sum_over_its_whole_border() -> None:
             0.25,
             np.zeros(0, int),
         )
-        kernels.accumulate_borders(
+        residuals.accumulate_borders(
             np.array(parents), joints, radii, mask, scale, blocks, forces
         )
         return blocks[0], forces[0]

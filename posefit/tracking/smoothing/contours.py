@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.fitting.bodies import ObservedFrames
+from posefit.fitting.contour_twists import Growth
 from posefit.fitting.contours import (
     MAX_ANGLE_STEP,
     ROBUST_SCALES,
@@ -70,7 +71,7 @@ CONTOUR_WINDOW = 300  # frames that are solved together
 CONTOUR_OVERLAP = 30  # frames that two neighbouring windows share
 
 
-def growth(body: Body, height: float | None, motion: Motion) -> tuple[Array, Array]:
+def growth(body: Body, height: float | None, motion: Motion) -> Growth:
     """Return how joints and radii change with the logarithms of the factors of a build.
 
     Args:
@@ -93,7 +94,7 @@ def growth(body: Body, height: float | None, motion: Motion) -> tuple[Array, Arr
     radii = [grown.radii - body.radii for grown in bodies]
     joint_changes = np.stack(joints, axis=1) / FACTOR_DIFFERENCE
     radius_changes = np.stack(radii) / FACTOR_DIFFERENCE
-    return joint_changes, radius_changes
+    return Growth(joint_changes, radius_changes)
 
 
 class Borders:
@@ -292,63 +293,111 @@ def _mean_cost(part: _Part, usable: ObservedFrames, beta: float) -> float:
 
 
 def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Part:
-    """Return a window after a Gauss-Newton step to the borders of all views."""
-    fitted = part.fitted
-    count = len(part.factors)
-    angles = np.flatnonzero(fitted.skeleton.free).tolist()
-    poses = fitted.poses.copy()
-    places = fitted.translations
+    """Return a window after a Gauss-Newton step to the borders of all views.
+
+    The unknowns are the degrees of freedom of each frame and, in all frames the same,
+    the factors of the build and the turns of the cameras. The normal equations of three
+    frames are
+
+        [ A A A M ] [ frame 1 ]       A: bands of the paths over time, `_frame_squares`
+        [ A A A M ] [ frame 2 ]       M: `mixed`, of frames and shared unknowns
+        [ A A A M ] [ frame 3 ]       S: the shared unknowns'
+        [ M M M S ] [ shared  ]
+
+    The frames are eliminated first, because A is banded. That leaves a small system for
+    the shared unknowns, the Schur complement S - M A^-1 M.
+    """
+    angles = np.flatnonzero(part.fitted.skeleton.free).tolist()
     turned = [
         border.seen_by(camera)
         for border, camera in zip(borders, part.cameras, strict=True)
     ]
     hessians, gradients, mixed, hessian, gradient = contour_squares(
-        part.body, turned, poses, places, scale, _changes(part)
+        part.body,
+        turned,
+        part.fitted.poses,
+        part.fitted.translations,
+        scale,
+        _growth_by_view(part),
     )
     squares = _frame_squares(part, hessians, gradients, angles)
-    # All frames share the factors and turns. So the frames are eliminated first, which
-    # leaves a small system for the shared numbers (the Schur complement).
     solved = squares.steps_for(
         np.concatenate([squares.gradients[..., None], mixed], axis=2)
     )
-    steps = solved[..., 0]
-    by_factor = solved[..., 1:]
-    # What is known about people weighs as much as `BUILD_FRAMES` frames, however many
-    # frames there are.
-    held = max(np.count_nonzero(part.visibility.usable) / BUILD_FRAMES, 1.0)
+    # the steps if the shared unknowns were held, and their change by each of these
+    steps = solved[..., 0]  # (T, n)
+    by_shared = solved[..., 1:]  # (T, n, s)
+    weight, known = _known_of_shared(part)
     values = np.append(part.factors, part.turns)
-    known = np.eye(count + part.turns.size) / CAMERA_DEVIATION**2
-    known[:count, :count] = PRECISION[:count, :count]
-    hessian = hessian + held * known - np.einsum("tni,tnj->ij", mixed, by_factor)
-    gradient = gradient + held * known @ values - np.einsum("tni,tn->i", mixed, steps)
-    changes = np.clip(
-        np.linalg.solve(hessian, gradient), -MAX_FACTOR_STEP, MAX_FACTOR_STEP
-    )
-    # the factors stay within the range in which builds are searched
+    schur = hessian + weight * known - np.einsum("tni,tnj->ij", mixed, by_shared)
+    right = gradient + weight * known @ values - np.einsum("tni,tn->i", mixed, steps)
+    shared = _limited(part, np.linalg.solve(schur, right))
+    deviations = np.sqrt(weight * np.diag(np.linalg.inv(schur)))
+    return _moved(part, angles, steps - by_shared @ shared, shared, deviations)
+
+
+def _known_of_shared(part: _Part) -> tuple[float, Array]:
+    """Return what is known about the s shared unknowns without masks.
+
+    Returns:
+        How many times it counts, and its precision (s, s): of the factors, as they vary
+        among people, and of the cameras' turns.
+    """
+    count = len(part.factors)
+    precision = np.eye(count + part.turns.size) / CAMERA_DEVIATION**2
+    precision[:count, :count] = PRECISION[:count, :count]
+    # as much as `BUILD_FRAMES` frames, however many frames there are
+    frames = np.count_nonzero(part.visibility.usable)
+    return max(frames / BUILD_FRAMES, 1.0), precision
+
+
+def _limited(part: _Part, shared: Array) -> Array:
+    """Return a step (s,) of the shared unknowns that is not too large.
+
+    The factors stay within the range in which builds are searched.
+    """
+    count = len(part.factors)
+    limited = np.clip(shared, -MAX_FACTOR_STEP, MAX_FACTOR_STEP)
     reach = REACH * SPREAD[:count]
-    changes[:count] = part.factors - np.clip(
-        part.factors - changes[:count], -reach, reach
-    )
-    steps = steps - by_factor @ changes
-    poses[:, angles] -= np.clip(steps[:, 3:], -MAX_ANGLE_STEP, MAX_ANGLE_STEP)
-    body = (
-        shaped(part.body, np.exp(-changes[:count]), part.height) if count else part.body
-    )
-    turns = changes[count:].reshape(-1, 3)
+    factors = np.clip(part.factors - limited[:count], -reach, reach)
+    limited[:count] = part.factors - factors
+    return limited
+
+
+def _moved(
+    part: _Part, angles: Sequence[int], steps: Array, shared: Array, deviations: Array
+) -> _Part:
+    """Return a window after steps are subtracted from all unknowns.
+
+    Args:
+        part: The window.
+        angles: The n - 3 angles that may change.
+        steps: (T, n) the steps of the frames.
+        shared: (s,) the step of the shared unknowns: factors, then turns of cameras.
+        deviations: (s,) the standard deviations of the shared unknowns.
+    """
+    count = len(part.factors)
+    body = part.body
+    if count:
+        body = shaped(part.body, np.exp(-shared[:count]), part.height)
+    turns = shared[count:].reshape(-1, 3)
     cameras = part.cameras
     if len(turns):
         cameras = [turned_camera(*each) for each in zip(cameras, -turns, strict=True)]
+    poses = part.fitted.poses.copy()
+    poses[:, angles] -= np.clip(steps[:, 3:], -MAX_ANGLE_STEP, MAX_ANGLE_STEP)
+    fitted = replace(
+        part.fitted,
+        skeleton=body.skeleton,
+        poses=poses,
+        translations=part.fitted.translations - steps[:, :3],
+    )
     return replace(
         part,
-        fitted=replace(
-            fitted,
-            skeleton=body.skeleton,
-            poses=poses,
-            translations=places - steps[:, :3],
-        ),
+        fitted=fitted,
         body=body,
-        factors=part.factors - changes[:count],
-        spread=np.sqrt(held * np.diag(np.linalg.inv(hessian)))[:count],
+        factors=part.factors - shared[:count],
+        spread=deviations[:count],
         cameras=cameras,
         turns=part.turns - turns,
     )
@@ -389,24 +438,29 @@ def _frame_squares(
     return squares
 
 
-def _changes(part: _Part) -> list[tuple[Array, Array]]:
-    """Return how joints and radii change in each view with build and camera turns."""
+def _growth_by_view(part: _Part) -> list[Growth]:
+    """Return how joints and radii change in each view with build and camera turns.
+
+    A camera's turn is a factor too. It moves the joints that this camera sees.
+    """
     joints = part.fitted.joints
     turns = part.turns.size
-    wider = np.empty((len(joints), 0, *joints.shape[1:]))
-    larger = np.empty((0, len(BONES), 2))
+    build = Growth(
+        np.empty((len(joints), 0, *joints.shape[1:])), np.empty((0, len(BONES), 2))
+    )
     if len(part.factors):
-        wider, larger = growth(part.body, part.height, part.fitted)
-    larger = np.concatenate([larger, np.zeros((turns, len(BONES), 2))])
-    changes = []
+        build = growth(part.body, part.height, part.fitted)
+    # turns change no radii
+    radii = np.concatenate([build.radii, np.zeros((turns, len(BONES), 2))])
+    views = []
     for view, camera in enumerate(part.cameras):
         turned = np.zeros((len(joints), turns, *joints.shape[1:]))
         # a turned camera sees the world turned about its optical centre
         if turns:
             away = (joints - camera.position)[:, None]
             turned[:, 3 * view : 3 * view + 3] = np.cross(np.eye(3)[:, None], away)
-        changes.append((np.concatenate([wider, turned], axis=1), larger))
-    return changes
+        views.append(Growth(np.concatenate([build.joints, turned], axis=1), radii))
+    return views
 
 
 def turned_camera(camera: Camera, turn: Array) -> Camera:

@@ -214,42 +214,46 @@ def in_doubt(
     """
     typical = np.median(costs[usable])
     excess = np.where(usable & (costs > HIGH_COST * typical), costs - typical, 0.0)
+    sums = np.append(0.0, np.cumsum(excess))  # of all frames before each
+    # the film begins and ends without an edge, so that nothing is near there
     ends = np.array([0, *edges, len(costs)])
-    # nothing is near the first and the last end, where the film begins and ends
     first = np.maximum(ends - reach, 0)
-    last = ends + reach
+    stop = np.minimum(ends + reach, len(costs))
     first[-1] = len(costs)
-    last[0] = 0
-    last = np.minimum(last, len(costs))
-    sums = np.append(0.0, np.cumsum(excess))
-    near = sums[last] - sums[first]
+    stop[0] = 0
+    near = sums[stop] - sums[first]
     until = np.append(0.0, np.cumsum(added))[ends]
-    # An exchange from edge a to a later edge b adds until[b] - until[a] to the costs,
-    # and saves at most near[a] + near[b]. It may be better if it adds less than it
-    # saves: until[b] - near[b] < until[a] + near[a], so that each side belongs to one
-    # edge.
+    # An exchange from a to a later b adds until[b] - until[a] to the costs, and saves
+    # at most near[a] + near[b]:
+    #
+    #     frames    ......[ near a ]..............[ near b ]......
+    #     exchanged           a -------------------- b
+    #
+    # It may be better if it adds less than it saves: until[b] - near[b] < until[a] +
+    # near[a], so that each side belongs to one end.
     opening = until + near
     closing = until - near
     better = np.zeros(len(ends), dtype=bool)
     apart = 1
     # Frames that are near both ends of a short stretch are in both sums, and must count
-    # once. So all edges are compared with those that come next, until none is so near.
-    while (last[:-apart] > first[apart:]).any():
-        shared = np.maximum(sums[last[:-apart]] - sums[first[apart:]], 0.0)
-        saves = closing[apart:] + shared < opening[:-apart]
+    # once. So ends are compared pair by pair, first with the next one, then with the
+    # one after that, until no pair has frames in common.
+    while (stop[:-apart] > first[apart:]).any():
+        common = np.maximum(sums[stop[:-apart]] - sums[first[apart:]], 0.0)
+        saves = closing[apart:] + common < opening[:-apart]
         better[:-apart] |= saves
         better[apart:] |= saves
         apart += 1
-    # Long stretches share no frames, so it is enough to compare each edge with the best
-    # of all later ones, and with the best of all earlier ones.
-    least = np.minimum.accumulate(closing[::-1])[::-1]
-    better[:-apart] |= least[apart:] < opening[:-apart]
-    most = np.maximum.accumulate(opening)
-    better[apart:] |= closing[apart:] < most[:-apart]
-    kept = [
+    # Pairs farther apart have no frames in common. So it is enough to compare each end
+    # with the best of all later ones, and with the best of all earlier ones.
+    least_later = np.minimum.accumulate(closing[::-1])[::-1]
+    better[:-apart] |= least_later[apart:] < opening[:-apart]
+    most_earlier = np.maximum.accumulate(opening)
+    better[apart:] |= closing[apart:] < most_earlier[:-apart]
+    retained = [
         edge for edge, is_better in zip(edges, better[1:-1], strict=True) if is_better
     ]
-    return kept, bool(better.any())
+    return retained, bool(better.any())
 
 
 def doubtful(
