@@ -27,7 +27,7 @@ from posefit.motion.motion import Motion
 from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask
-from posefit.silhouette.rasteriser import NEAR
+from posefit.silhouette.outlines import NEAR
 
 # side of a weave in texels; it is one turn around a limb and `LENGTH` metres along it
 TILE = 256

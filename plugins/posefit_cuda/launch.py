@@ -15,7 +15,8 @@ from numba.cuda.extending import overload
 from posefit.geometry import kernels
 from posefit.geometry.kernels import PI_HIGH, PI_LOW
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS
-from posefit.silhouette.rasteriser import FAR, FLAT, HUGE, NEAR, ONE, WINDOW, ZERO
+from posefit.silhouette.outlines import FAR, FLAT, NEAR
+from posefit.silhouette.rasteriser import HUGE, ONE, WINDOW, ZERO
 from posefit.silhouette.spans import BLOCK
 from posefit.silhouette.spans import STRIP_PIXELS as STRIP
 

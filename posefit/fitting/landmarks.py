@@ -8,7 +8,7 @@ from posefit.arrays import Array
 from posefit.fitting.weights import logistic
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import JOINTS, MIRROR, Skeleton
-from posefit.silhouette.rasteriser import NEAR
+from posefit.silhouette.outlines import NEAR
 
 # Joints that a detector exchanges together or not at all.
 _TOGETHER = (

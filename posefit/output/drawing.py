@@ -15,7 +15,7 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import JOINTS, PARENTS, SIDES
 from posefit.silhouette.foreground import Image
-from posefit.silhouette.rasteriser import NEAR
+from posefit.silhouette.outlines import NEAR
 
 BACKGROUND = (28, 24, 22)
 # the areas Y, R and B of the cost

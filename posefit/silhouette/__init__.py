@@ -6,7 +6,7 @@
 | areas R, B, Y and the cost of poses; a body drawn as a mask | cost.py |
 | work on thousands of poses shared by threads | sharing.py |
 | the count of drawn poses | drawn.py |
-| the rasteriser: a body drawn into a bit image, compiled | rasteriser.py |
+| a body drawn into a bit image, compiled | rasteriser.py, outlines.py |
 | instructions that the rasteriser needs and numba lacks | spans.py |
 | pixels of bodies counted against silhouettes, compiled | kernels.py |
 | a person separated from the background, pixel by pixel | foreground.py |

@@ -15,7 +15,7 @@ from posefit.geometry.skeleton import ANGLES, Skeleton
 from posefit.silhouette.cost import areas, drawing_of, mismatch, project
 from posefit.silhouette.drawn import PoseCount, count_poses
 from posefit.silhouette.kernels import count_areas
-from posefit.silhouette.rasteriser import FAR, NEAR
+from posefit.silhouette.outlines import FAR, NEAR
 from posefit.silhouette.sharing import parts_of, work_through
 from tests.cases import each
 from tests.silhouette.twin import TIE, body_distance, random_poses

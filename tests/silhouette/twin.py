@@ -5,7 +5,7 @@ import numpy as np
 from posefit import Body, Camera
 from posefit.arrays import Array
 from posefit.geometry.skeleton import ANGLES, PARENTS
-from posefit.silhouette.rasteriser import FAR, NEAR
+from posefit.silhouette.outlines import FAR, NEAR
 
 TIE = 1e-3  # pixels, within which rounding may decide: the kernel's rows are float32
 

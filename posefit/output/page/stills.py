@@ -18,7 +18,7 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask
-from posefit.silhouette.rasteriser import NEAR
+from posefit.silhouette.outlines import NEAR
 
 MAX_FRAMES = 1_200  # longer tracks show every second, fourth, ... frame
 # characters for all frames of footage, and for the masks of all cameras
