@@ -30,8 +30,11 @@ _TORSO = np.array([AT[name] for name in BODY])
 _TIP_NAMES = ("head", "left hand", "right hand", "left foot", "right foot")
 _TIPS = np.array([AT[name] for name in _TIP_NAMES])
 _RINGS = np.array([0.8, 1.0, 1.2])  # radii of the head
-# pixels: points of the skeleton line closer than this are one crossing
-ONE_CROSSING = 2.0
+# Tolerances in pixels, ours: the skeleton line is one pixel wide, so that it meets a
+# line or a place only to within a pixel or two.
+ON_PARALLEL = 1.0  # a point this near to the parallel through the legs is on it
+EVEN = 1.5  # distances from hand and shoulder that differ by less are equal
+ONE_CROSSING = 2.0  # points of the skeleton line closer than this are one crossing
 # leg lengths: the limits of a point's gate; NO_GATE accepts everything
 GATE = (0.35, 1.2)
 NO_GATE = (1e3, 1e3)
@@ -232,7 +235,7 @@ def _elbow(
     to_hand, to_shoulder, to_elbow = _distances(
         np.array([points[hand], points[shoulder], expected[elbow]]), lines.skeleton
     )
-    even = np.abs(to_hand - to_shoulder) < 1.5  # VSMM 2.6
+    even = np.abs(to_hand - to_shoulder) < EVEN  # VSMM 2.6
     candidates = np.flatnonzero(even & (to_elbow < gates[elbow]))
     if not len(candidates):
         return None
@@ -265,7 +268,7 @@ def _knees(
     across = np.array([-along[1], along[0]]) / length
     # VSMM 2.5
     off_parallel = np.abs((lines.skeleton - legs.mean(axis=0)) @ across)
-    crossings = lines.skeleton[off_parallel < 1.0]
+    crossings = lines.skeleton[off_parallel < ON_PARALLEL]
     if not len(crossings):
         return {}
     names = ("left knee", "right knee")
@@ -306,18 +309,25 @@ def two_crossings(distances: Array, places: Array) -> Indices:
 
 # pixels per frame squared: the standard deviation of a joint's acceleration
 ACCELERATION = 2.0
+# Standard deviations of the first position and velocity: column, row, and their
+# changes, in pixels and pixels per frame.
+FIRST_DEVIATIONS = np.array([5.0, 5.0, 3.0, 3.0])
+# The constant-velocity model: the velocity is added to the position, and a random
+# acceleration, constant within a frame, changes both.
 _STEP = np.kron([[1.0, 1.0], [0.0, 1.0]], np.eye(2))
 _NOISE = ACCELERATION**2 * np.kron([[0.25, 0.5], [0.5, 1.0]], np.eye(2))
 
 
 class JointFilter:
-    """Kalman filters of the position and velocity of the 17 points in one image."""
+    """Kalman filters of the 17 points in one image, with constant velocities.
+
+    Each point has its own filter. Its state is column, row, and the change of both from
+    one frame to the next.
+    """
 
     def __init__(self, points: Array) -> None:
         self._states = np.column_stack([points, np.zeros_like(points)])
-        self._covariances = np.tile(
-            np.diag([25.0, 25.0, 9.0, 9.0]), (len(points), 1, 1)
-        )
+        self._covariances = np.tile(np.diag(FIRST_DEVIATIONS**2), (len(points), 1, 1))
 
     def follow(self, points: Array, confidence: Array, variances: Array) -> Array:
         """Predict and update the points by those detected in the next frame.

@@ -2,9 +2,21 @@
 
 The field's term is model-set adaptation. When the limbs change their speed, a second
 group is activated next to the present one; a test then ends one of the two. Only
-`Switching` changes which models are active. There are two forms, the default and the
-patent's letter. They differ in how the filter starts a new group's models: they take a
-`Union` of both groups and return a `Belief` over it.
+`Switching` changes which models are active.
+
+There are two forms, the default and the patent's letter. A form decides how the filter
+represents states and how a new group's models start. It changes nothing itself: it
+takes a `Union` of both groups and returns a `Belief` over it.
+
+| | `DefaultForm` | `PatentForm` |
+|---|---|---|
+| covariances of | errors (33) | the state's numbers (43), Interpretation V4 |
+| residuals at | predicted states | mixed states, Interpretation V3 |
+| cycles over all models, step 5 | a second, Interpretation V19 | ten |
+| a new model's state | mixed, by the transitions | the nearest captured pose, 8.3 |
+| its probability | by the transitions, V11 | that of the most probable model, 8.1 |
+| its first covariance | predicted, as any | the model's noise, 8.2 |
+| the ratio of step 9 begins | in the frame after | in the frame of the request, k0 |
 
 The active models go through these states, frame by frame:
 

@@ -105,6 +105,43 @@ def _is_detected(point: str, measured: Sequence[JointMeasurement]) -> bool:
 
 
 @final
+class LossTest:
+    """Tests whether a track is lost: its person is hidden, or does not fit, too long.
+
+    Interpretation V14.
+    """
+
+    def __init__(self) -> None:
+        self._blind_frames = 0
+        self._bad_frames = 0
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether the track is lost."""
+        hidden = self._blind_frames > MAX_BLIND_FRAMES
+        return hidden or self._bad_frames >= LOST_FRAMES
+
+    def restart(self) -> None:
+        """Forget the frames that did not fit: a first state was found again."""
+        self._bad_frames = 0
+
+    def add_view(self, blind: bool) -> None:
+        """Take whether the person is hidden in the next frame."""
+        self._blind_frames = self._blind_frames + 1 if blind else 0
+
+    def add_pose(self, areas: Areas, observation: Observation) -> None:
+        """Take the areas (V, 3) of the frame's pose.
+
+        A frame without the person changes nothing.
+        """
+        if self._blind_frames:
+            return
+        known = known_views(list(areas), observation.silhouettes)
+        bad = metrics.iou(np.array(known)).mean() < LOST_IOU
+        self._bad_frames = self._bad_frames + 1 if bad else 0
+
+
+@final
 class TrackFilter:
     """The state of one track, advanced frame by frame."""
 
@@ -138,29 +175,25 @@ class TrackFilter:
             self._recovers = variant.recovers
         self._latest: Frame | None = task.before[-1] if task.before else None
         self._joint_filters: list[JointFilter] = []
-        self._belief: Belief | None = None
-        self._evaluations = 0  # in the current frame
-        self._blind_frames = 0
-        self._bad_frames = 0
+        self._belief: Belief | None = None  # None before the start, and once lost
+        self._loss_test = LossTest()
 
     def frame(self, observation: Observation) -> Frame:
         """Return the frame of the next observation."""
         start = time.perf_counter()
-        self._evaluations = 0
         views: list[Lines | None] = [None] * len(observation.silhouettes)
         if observation.usable:
             views = [lines_of(view.mask) for view in observation.silhouettes]
         blind = all(lines is None for lines in views)  # the person is hidden
-        if blind:
-            self._blind_frames += 1
-        else:
-            self._blind_frames = 0
-        if self._recovers and self._lost():
+        self._loss_test.add_view(blind)
+        if self._recovers and self._loss_test.is_lost:
             self._belief = None
+        evaluations = 1  # the cost of the frame itself
         if self._belief is None:
             if blind:
                 return self._repeated(observation)
-            self._belief = self._start(observation)
+            self._belief, used = self._start(observation)
+            evaluations += used
         belief, measured, details = self._detect(self._belief, views, observation)
         details["detection_seconds"] = time.perf_counter() - start
 
@@ -174,23 +207,20 @@ class TrackFilter:
         state, _ = self.switching.fused(belief)
         details["filter_seconds"] = time.perf_counter() - start
         (pose,), (place,) = decode(state[None], self._dependent)
-        self._evaluations += 1  # for the cost of the frame itself
-        return self._frame(pose, place, observation, details)
-
-    def _lost(self) -> bool:
-        """Return whether the person was hidden, or the poses did not fit, too long."""
-        hidden = self._blind_frames > MAX_BLIND_FRAMES
-        return hidden or self._bad_frames >= LOST_FRAMES
+        return self._frame(pose, place, observation, evaluations, details)
 
     def _repeated(self, observation: Observation) -> Frame:
-        """Return the latest pose again, or an upright one before the first."""
+        """Return the latest pose again, or an upright one before the first.
+
+        It is not a result of the filter, so its cost is not an evaluation.
+        """
         if self._latest is not None:
             pose = self._latest.pose
             place = self._latest.translation
         else:
             pose = np.append(self._task.yaw or 0.0, np.zeros(ANGLES - 1))
             place = self._task.anchor
-        return self._frame(pose, place, observation, {})
+        return self._frame(pose, place, observation, 0, {})
 
     def _detect(
         self, belief: Belief, views: Sequence[Lines | None], observation: Observation
@@ -225,25 +255,26 @@ class TrackFilter:
             measured = imputed
         return belief, measured, details
 
-    def _start(self, observation: Observation) -> Belief:
-        """Return the belief in the state (43,) that fits this frame best.
+    def _start(self, observation: Observation) -> tuple[Belief, int]:
+        """Return the belief in the state that fits this frame best, and evaluations.
 
         All models are equally probable.
         """
-        state, self._evaluations = self._first_state.estimate(
+        state, evaluations = self._first_state.estimate(
             observation, self._latest, self._rng
         )
         self.switching.restart()
         self._missing.restart()
-        self._bad_frames = 0
+        self._loss_test.restart()
         deviations = INITIAL_DEVIATIONS * self._scales
-        return self.switching.start(state, np.diag(deviations**2))
+        return self.switching.start(state, np.diag(deviations**2)), evaluations
 
     def _frame(
         self,
         pose: Array,
         place: Array,
         observation: Observation,
+        evaluations: int,
         details: Mapping[str, Any],
     ) -> Frame:
         """Return a frame with its cost, its activity, and the models in its details."""
@@ -256,7 +287,7 @@ class TrackFilter:
             task.body, task.cameras, observation.silhouettes, pose[None], place[None]
         )
         areas = counts[:, 0]  # (V, 3)
-        self._count_bad_frame(areas, observation)
+        self._loss_test.add_pose(areas, observation)
         activity, models = self._active_models()
         cost = float(costs[0])
         self._latest = Frame(
@@ -264,26 +295,12 @@ class TrackFilter:
             translation=place,
             cost=cost,
             areas=areas,
-            evaluations=self._evaluations,
-            trace=np.array([[self._evaluations, cost]]),
+            evaluations=evaluations,
+            trace=np.array([[evaluations, cost]]),
             activity=activity,
             details={**details, **models},
         )
         return self._latest
-
-    def _count_bad_frame(self, areas: Areas, observation: Observation) -> None:
-        """Count successive frames whose pose does not fit; hidden ones change nothing.
-
-        `areas` (V, 3) are those of the frame's pose.
-        """
-        if self._blind_frames:
-            return
-        known = known_views(list(areas), observation.silhouettes)
-        iou = metrics.iou(np.array(known)).mean()
-        if iou < LOST_IOU:
-            self._bad_frames += 1
-        else:
-            self._bad_frames = 0
 
     def _active_models(self) -> tuple[str | None, dict[str, Any]]:
         """Return the activity, None if lost, and the models as details of a frame."""
