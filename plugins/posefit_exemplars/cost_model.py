@@ -303,7 +303,7 @@ class HypothesisCosts:
         silhouette_costs = frame_costs.full(poses, places)
         # in a second pass several cameras show limbs that no clip combines, so the
         # distance from the clips counts only as much as one view
-        first_pass = frame_costs.observation.estimate is None
+        first_pass = frame_costs.earlier is None
         views = 1 if first_pass else frame_costs.camera_count
         library_cost = ALONE_LIBRARY_COST if frame_costs.alone else LIBRARY_COST
         distances = np.log1p(0.5 * squares / LIBRARY_DISTANCE**2)

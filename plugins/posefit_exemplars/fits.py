@@ -42,6 +42,7 @@ ALIGNED_SHIFT = 0.05
 SIMILAR_POSES = 8
 
 PosesAndPlaces = tuple[Array, Array]  # (n, 66), and (n, 3) metres
+PLACES_COMPARED = 2.0  # the place where a hypothesis leads, and the aligned one
 
 
 def fresh_evaluations() -> float:
@@ -52,9 +53,10 @@ def fresh_evaluations() -> float:
 def continued_evaluations() -> float:
     """Return the evaluations of a hypothesis that continues.
 
-    They are its fit, the cost of the fitted pose, and those of both places to start at.
+    They are its fit, the cost of the fitted pose, and those of both places to start at,
+    between which `FrameFits.continued` chooses unless the root is known.
     """
-    return len(CONTINUED_REACHES) * STEP_EVALUATIONS + 3.0
+    return len(CONTINUED_REACHES) * STEP_EVALUATIONS + 1.0 + PLACES_COMPARED
 
 
 def library_precisions(noise: float) -> Array:
@@ -138,9 +140,9 @@ class FrameFits:
         if self._frame_costs.root is None:
             places = self._cheaper_places(poses, places)
         else:
-            # a known root leaves no choice, and saves two evaluations of each pose
+            # a known root leaves no choice, so no places were compared
             places = self._frame_costs.at_root(places)
-            self.evaluations -= 2.0 * len(poses)
+            self.evaluations -= PLACES_COMPARED * len(poses)
         means, pulls = self._pulls(poses)
         return fitted(
             self._task.body,

@@ -27,10 +27,11 @@ def small_factor(cameras: Sequence[Camera]) -> int:
 
 
 class FrameCosts:
-    """The costs of poses in one frame, from its silhouettes and landmarks.
+    """The costs of poses in one frame, and what the frame shows of the person.
 
-    Costs in the `small` picture are cheaper and coarser: it has every fourth pixel of
-    every fourth row, or every second if it would be too small.
+    All stages of the tracker share it. Costs in the `small` picture are cheaper and
+    coarser: it has every fourth pixel of every fourth row, or every second if it would
+    be too small.
 
     Args:
         task: The task.
@@ -42,6 +43,8 @@ class FrameCosts:
         camera_position: (3,) metres, the position of the only one of these. None if
             there are several, because they show depth, too.
         root: (3,) metres, or None if the root is unknown.
+        earlier: The pose (66,) and the place (3,) that an earlier track reported, in a
+            second pass over the frames; None in the first pass.
         small_share: The effort of a cost in the small picture, as a share of that of a
             cost at full size.
         usable: Whether the frame shows enough of the person.
@@ -67,6 +70,7 @@ class FrameCosts:
         self._views = known_views(task.cameras, silhouettes)
         self.camera_count = len(self._views)
         self.skeleton = task.body.skeleton
+        self.earlier = observation.estimate
         self.yaw = observation.yaw
         self.usable = observation.usable
         known = observation.translation if task.translation == "known" else None

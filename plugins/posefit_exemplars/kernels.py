@@ -120,7 +120,13 @@ class Buffers(NamedTuple):
 
 
 class Bounds(NamedTuple):
-    """Which steps are wanted."""
+    """Which steps are wanted, by the totals of the states that they reach.
+
+    The bound of `cheapest_steps` falls from the limit as states are reached:
+
+        least                          bound                      limit
+          |------ the wanted states -----|------ not looked at -----|--- left out ---
+    """
 
     scale: float  # cost of a unit of squared distance
     least: float  # no step has a lower total

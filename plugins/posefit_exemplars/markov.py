@@ -161,7 +161,9 @@ class Sampling(NamedTuple):
     """How paths are sampled."""
 
     paths: int  # how many are drawn
-    power: float  # the likelihoods of silhouettes are raised to it
+    # The likelihoods of silhouettes are raised to it: the costs of hypotheses are over
+    # one temperature, and those of the reported posterior over another, higher one.
+    power: float
 
 
 def sample_states(

@@ -390,7 +390,8 @@ class HypothesisPath:
             if len(rows):
                 continued = fits.continued(latest.continued(rows))
             evaluations = fits.evaluations
-            if frame_costs.observation.estimate is not None:
+            # `HypothesisProposals.fresh` has searched for limbs of the earlier pose
+            if frame_costs.earlier is not None:
                 evaluations += limb_evaluations()
         poses, places = (
             np.concatenate(arrays) for arrays in zip(fresh, continued, strict=True)

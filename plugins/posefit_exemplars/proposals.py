@@ -382,10 +382,8 @@ class HypothesisProposals:
         reflections = self.counts(frame_costs).fresh - len(poses)
         if reflections > 0:
             starts.append(self._reflected(estimate, likeliest, reflections))
-        if frame_costs.observation.estimate is not None:
-            starts += self._from_earlier_track(
-                frame_costs, *frame_costs.observation.estimate, rng
-            )
+        if frame_costs.earlier is not None:
+            starts += self._from_earlier_track(frame_costs, *frame_costs.earlier, rng)
         all_poses, all_places = zip(*starts, strict=True)
         return np.concatenate(all_poses), np.concatenate(all_places)
 

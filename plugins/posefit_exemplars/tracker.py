@@ -1,4 +1,17 @@
-"""The tracker: its settings, and its two paths, each reported some frames later."""
+"""The tracker: its settings, and its stages, each of which sees some frames ahead.
+
+A frame passes four stages. Each waits for later frames, so that the last one reports a
+frame `lag` frames after its observation:
+
+    stage                        waits for      reports
+    ClipPath                     path_ahead     the state on the likeliest path of clips
+    HypothesisPath               fits_ahead     the pose of the likeliest hypotheses
+    smoothed                     self._ahead    the mean pose over time
+    reported                     nothing        the frame and its posterior
+    with_failure_probabilities   nothing        the probability that it is lost
+                                 -----------
+                                 lag in all
+"""
 
 import math
 from collections.abc import Iterable, Iterator

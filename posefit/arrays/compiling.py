@@ -36,7 +36,7 @@ from numba.core import event  # numba's documented interface for applications
 from posefit.arrays import folders
 
 config: Any = numba.config
-# the folder of each module with compiled functions; None if nothing can be saved
+# by module: the folder where its compiled functions are saved; None if they cannot be
 _folders: dict[str, Path | None] = {}
 # numba reads the folder from its configuration, which all threads share
 _configuring = threading.Lock()
@@ -125,7 +125,9 @@ def state_of(module: str) -> str:
     """Return a module's name with a digest of everything that its functions depend on.
 
     That is the module's source, the constants that it imports, and the same for
-    every module that it imports, or imports a function from.
+    every module that it imports, or imports a function from. It reads the names that
+    modules have at that moment: what is imported inside a function is not included, and
+    what a module imports must stand before its first compiled function.
     """
     digest = hashlib.sha256(numba.__version__.encode())
     modules = [module]
