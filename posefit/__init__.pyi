@@ -15,9 +15,9 @@ from posefit.fitting.problem import Problem as Problem
 from posefit.fitting.problem import Problems as Problems
 from posefit.fitting.problem import minimise as minimise
 from posefit.fitting.space import SearchSpace as SearchSpace
+from posefit.fitting.synthesis import SynthesisTracker as SynthesisTracker
 from posefit.fitting.tracker import Frame as Frame
 from posefit.fitting.tracker import Observation as Observation
-from posefit.fitting.tracker import SynthesisTracker as SynthesisTracker
 from posefit.fitting.tracker import Task as Task
 from posefit.fitting.tracker import Tracker as Tracker
 from posefit.footage.device import moved_to as moved_to

@@ -7,7 +7,7 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
-from posefit.fitting.tracker import Prediction
+from posefit.fitting.synthesis import Prediction
 from posefit.hooks import PROJECT
 from posefit.registry import KINDS, Offer, registry
 from posefit.settings import setting_text, settings_in, settings_of, without_settings

@@ -9,7 +9,7 @@ from posefit import Problem, Problems
 from posefit.arrays import Array
 from posefit.fitting.check import whole
 from posefit.fitting.metrics import mpjpe_mm, pose_error_degrees
-from posefit.fitting.tracker import Prediction, Predictor
+from posefit.fitting.synthesis import Prediction, Predictor
 from posefit.geometry.skeleton import ANGLES
 from posefit_envs.base import (
     Flags,

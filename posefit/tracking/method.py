@@ -18,14 +18,8 @@ from posefit.fitting.check import one_of
 from posefit.fitting.driving import Audit, drive
 from posefit.fitting.optimiser import NextFrame, Optimiser
 from posefit.fitting.prior import Latents, Prior
-from posefit.fitting.tracker import (
-    RELOCALISE_GAP,
-    Follow,
-    InitialiserFactory,
-    Prediction,
-    SynthesisTracker,
-    Task,
-)
+from posefit.fitting.synthesis import RELOCALISE_GAP, Prediction, SynthesisTracker
+from posefit.fitting.tracker import Follow, InitialiserFactory, Task
 from posefit.fitting.validation import (
     Checked,
     check_prior,

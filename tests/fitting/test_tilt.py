@@ -9,7 +9,8 @@ import pytest
 from posefit import Body, Camera, Motion, SearchSpace, Task
 from posefit.arrays import Array
 from posefit.fitting.prior import Tilt
-from posefit.fitting.tracker import Observation, Prediction, Predictor, SynthesisTracker
+from posefit.fitting.synthesis import Prediction, Predictor, SynthesisTracker
+from posefit.fitting.tracker import Observation
 from posefit.motion import built_in
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions

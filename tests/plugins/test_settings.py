@@ -13,7 +13,7 @@ import pytest
 import posefit
 from posefit.errors import InputError
 from posefit.fitting.check import choices
-from posefit.fitting.tracker import Prediction
+from posefit.fitting.synthesis import Prediction
 from posefit.hooks import PROJECT
 from posefit.registry import register, registry
 from posefit.settings import (

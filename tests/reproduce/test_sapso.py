@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 
 from posefit.cli import main
 from posefit.evaluation.measures import BASELINES
-from posefit.fitting.tracker import Prediction, Predictor
+from posefit.fitting.synthesis import Prediction, Predictor
 from posefit.geometry.rotation import wrapped
 from posefit.testing.toy import Toy
 from posefit.tracking.defaults import completed

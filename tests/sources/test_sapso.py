@@ -23,7 +23,7 @@ from posefit import (
 )
 from posefit.fitting import metrics
 from posefit.fitting.prior import Components
-from posefit.fitting.tracker import Prediction, Predictor, SynthesisTracker
+from posefit.fitting.synthesis import Prediction, Predictor, SynthesisTracker
 from posefit.geometry.rotation import rotation_from_root_angles, yaw_first
 from posefit.geometry.skeleton import ANGLES, ENDS, INNER, JOINTS
 from posefit.motion import built_in

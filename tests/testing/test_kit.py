@@ -15,7 +15,8 @@ import pytest
 from posefit.arrays import Array
 from posefit.cli.template import write_plugin
 from posefit.fitting.box import Space
-from posefit.fitting.tracker import Prediction, SynthesisTracker, Task
+from posefit.fitting.synthesis import Prediction, SynthesisTracker
+from posefit.fitting.tracker import Task
 from posefit.registry import registry
 from posefit.testing import (
     check_optimiser,

@@ -16,7 +16,7 @@ from click.testing import CliRunner
 
 from posefit.cli import main
 from posefit.errors import InputError
-from posefit.fitting.tracker import SynthesisTracker
+from posefit.fitting.synthesis import SynthesisTracker
 from posefit.footage import live
 from posefit.footage.extraction import Extraction
 from posefit.footage.live import Stream, live_views, netpbm_images

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from posefit.arrays import Array
 from posefit.fitting.cost import SilhouetteCost
 from posefit.fitting.problem import Problem, minimise
-from posefit.fitting.tracker import Prediction, Predictor
+from posefit.fitting.synthesis import Prediction, Predictor
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import INNER, JOINTS, PARENTS
 from posefit.report.figures import COLOURS
