@@ -146,11 +146,11 @@ class Borders:
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
+class _Window:
     """The frames of a window, with what is fitted in them."""
 
     estimate: Motion  # before it is fitted
-    fitted: Motion
+    motion: Motion
     body: Body
     factors: Array  # (17,) logarithms of the factors so far; (0,) if the build is known
     height: float | None
@@ -192,43 +192,45 @@ def fit_contours(
     if len(motion) < 3 or not visibility.usable.any():
         return scene, motion, shape
     borders = borders or Borders(scene.observations)
-    parts = windows_over(len(motion), CONTOUR_WINDOW, CONTOUR_OVERLAP)
-    fitted: dict[int, _Part] = {}
+    spans = windows_over(len(motion), CONTOUR_WINDOW, CONTOUR_OVERLAP)
+    done: dict[int, _Window] = {}
+    # first the window that shows most, whose build and cameras the others then keep
     if shape is not None or scene.cameras_turn:
-        best = int(np.argmax([visibility.usable[rows].sum() for rows, _ in parts]))
-        rows = parts[best][0]
-        start = _part_of(scene, motion, visibility, rows, shape, turned=True)
-        part = fitted[best] = _fitted(start, scene, rows, borders, beta, scales)
+        best = int(np.argmax([visibility.usable[rows].sum() for rows, _ in spans]))
+        rows = spans[best][0]
+        start = _window_of(scene, motion, visibility, rows, shape, turned=True)
+        window = _fitted_window(start, scene, rows, borders, beta, scales)
+        done[best] = window
         # else no build fits better, and only poses are fitted
-        if shape is not None and part.body is not scene.body:
-            spread = np.minimum(np.hypot(part.spread, MODEL_SPREAD), SPREAD)
+        if shape is not None and window.body is not scene.body:
+            spread = np.minimum(np.hypot(window.spread, MODEL_SPREAD), SPREAD)
             shape = replace(
-                shape, body=part.body, factors=np.exp(part.factors), spread=spread
+                shape, body=window.body, factors=np.exp(window.factors), spread=spread
             )
-        scene = replace(scene, body=part.body, cameras=part.cameras)
+        scene = replace(scene, body=window.body, cameras=window.cameras)
     poses = motion.poses.copy()
     places = motion.translations.copy()
-    for k, (rows, inner) in enumerate(parts):
-        if k not in fitted:
-            start = _part_of(scene, motion, visibility, rows, None)
-            part = _fitted(start, scene, rows, borders, beta, scales)
-        else:
-            part = fitted[k]
-        poses[rows[inner]] = part.fitted.poses[inner]
-        places[rows[inner]] = part.fitted.translations[inner]
-    skeleton = scene.body.skeleton
-    fitted_motion = replace(motion, skeleton=skeleton, poses=poses, translations=places)
-    return scene, fitted_motion, shape
+    for k, (rows, inner) in enumerate(spans):
+        if k not in done:
+            start = _window_of(scene, motion, visibility, rows, None)
+            done[k] = _fitted_window(start, scene, rows, borders, beta, scales)
+        window = done.pop(k)
+        poses[rows[inner]] = window.motion.poses[inner]
+        places[rows[inner]] = window.motion.translations[inner]
+    fitted = replace(
+        motion, skeleton=scene.body.skeleton, poses=poses, translations=places
+    )
+    return scene, fitted, shape
 
 
-def _part_of(
+def _window_of(
     scene: Scene,
     motion: Motion,
     visibility: Visibility,
     rows: NDArray[np.int64],
     shape: Shape | None,
     turned: bool = False,
-) -> _Part:
+) -> _Window:
     """Return some frames of a motion before they are fitted.
 
     The build will be fitted too unless `shape` is None, and the cameras if `turned`.
@@ -241,7 +243,7 @@ def _part_of(
     )
     factors = np.empty(0) if shape is None else np.log(shape.factors)
     turning = turned and scene.cameras_turn
-    return _Part(
+    return _Window(
         estimate,
         estimate,
         scene.body,
@@ -254,45 +256,44 @@ def _part_of(
     )
 
 
-def _fitted(
-    part: _Part,
+def _fitted_window(
+    window: _Window,
     scene: Scene,
     rows: NDArray[np.int64],
     borders: Borders,
     beta: float,
     scales: Sequence[float],
-) -> _Part:
+) -> _Window:
     """Return some frames of a scene after the best step from a start."""
-    places = part.estimate.translations
+    places = window.estimate.translations
     contours = [
         borders.of(camera, view, rows, places)
         for view, camera in enumerate(scene.cameras)
     ]
     observations = (scene.observations[k] for k in rows.tolist())
     usable = ObservedFrames.of(each for each in observations if each.usable)
-    best = part
-    least = _mean_cost(part, usable, beta)
+    best = window
+    least = _mean_cost(window, usable, beta)
     for scale in scales:
-        part = _stepped(part, contours, scale)
-        if (cost := _mean_cost(part, usable, beta)) < least:
-            best = part
+        window = _stepped(window, contours, scale)
+        if (cost := _mean_cost(window, usable, beta)) < least:
+            best = window
             least = cost
     return best
 
 
-def _mean_cost(part: _Part, usable: ObservedFrames, beta: float) -> float:
+def _mean_cost(window: _Window, usable: ObservedFrames, beta: float) -> float:
     """Return the mean cost of the usable frames, or infinity if no frame is usable."""
-    rows = part.visibility.usable
+    rows = window.visibility.usable
     if not rows.any():
         return np.inf
-    fitted = part.fitted
-    costs = usable.costs_of(
-        part.body, part.cameras, fitted.poses[rows], fitted.translations[rows], beta
-    )
+    poses = window.motion.poses[rows]
+    places = window.motion.translations[rows]
+    costs = usable.costs_of(window.body, window.cameras, poses, places, beta)
     return float(np.mean(costs))
 
 
-def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Part:
+def _stepped(window: _Window, borders: Sequence[MaskContours], scale: float) -> _Window:
     """Return a window after a Gauss-Newton step to the borders of all views.
 
     The unknowns are the degrees of freedom of each frame and, in all frames the same,
@@ -307,114 +308,118 @@ def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Par
     The frames are eliminated first, because A is banded. That leaves a small system for
     the shared unknowns, the Schur complement S - M A^-1 M.
     """
-    angles = np.flatnonzero(part.fitted.skeleton.free).tolist()
+    angles = np.flatnonzero(window.motion.skeleton.free).tolist()
     turned = [
         border.seen_by(camera)
-        for border, camera in zip(borders, part.cameras, strict=True)
+        for border, camera in zip(borders, window.cameras, strict=True)
     ]
     hessians, gradients, mixed, hessian, gradient = contour_squares(
-        part.body,
+        window.body,
         turned,
-        part.fitted.poses,
-        part.fitted.translations,
+        window.motion.poses,
+        window.motion.translations,
         scale,
-        _growth_by_view(part),
+        _growth_by_view(window),
     )
-    squares = _frame_squares(part, hessians, gradients, angles)
+    squares = _frame_squares(window, hessians, gradients, angles)
     solved = squares.steps_for(
         np.concatenate([squares.gradients[..., None], mixed], axis=2)
     )
     # the steps if the shared unknowns were held, and their change by each of these
     steps = solved[..., 0]  # (T, n)
     by_shared = solved[..., 1:]  # (T, n, s)
-    weight, known = _known_of_shared(part)
-    values = np.append(part.factors, part.turns)
+    weight, known = _known_of_shared(window)
+    values = np.append(window.factors, window.turns)
     schur = hessian + weight * known - np.einsum("tni,tnj->ij", mixed, by_shared)
     right = gradient + weight * known @ values - np.einsum("tni,tn->i", mixed, steps)
-    shared = _limited(part, np.linalg.solve(schur, right))
+    shared = _limited(window, np.linalg.solve(schur, right))
     deviations = np.sqrt(weight * np.diag(np.linalg.inv(schur)))
-    return _moved(part, angles, steps - by_shared @ shared, shared, deviations)
+    return _moved(window, angles, steps - by_shared @ shared, shared, deviations)
 
 
-def _known_of_shared(part: _Part) -> tuple[float, Array]:
+def _known_of_shared(window: _Window) -> tuple[float, Array]:
     """Return what is known about the s shared unknowns without masks.
 
     Returns:
         How many times it counts, and its precision (s, s): of the factors, as they vary
         among people, and of the cameras' turns.
     """
-    count = len(part.factors)
-    precision = np.eye(count + part.turns.size) / CAMERA_DEVIATION**2
+    count = len(window.factors)
+    precision = np.eye(count + window.turns.size) / CAMERA_DEVIATION**2
     precision[:count, :count] = PRECISION[:count, :count]
     # as much as `BUILD_FRAMES` frames, however many frames there are
-    frames = np.count_nonzero(part.visibility.usable)
+    frames = np.count_nonzero(window.visibility.usable)
     return max(frames / BUILD_FRAMES, 1.0), precision
 
 
-def _limited(part: _Part, shared: Array) -> Array:
+def _limited(window: _Window, shared: Array) -> Array:
     """Return a step (s,) of the shared unknowns that is not too large.
 
     The factors stay within the range in which builds are searched.
     """
-    count = len(part.factors)
+    count = len(window.factors)
     limited = np.clip(shared, -MAX_FACTOR_STEP, MAX_FACTOR_STEP)
     reach = REACH * SPREAD[:count]
-    factors = np.clip(part.factors - limited[:count], -reach, reach)
-    limited[:count] = part.factors - factors
+    factors = np.clip(window.factors - limited[:count], -reach, reach)
+    limited[:count] = window.factors - factors
     return limited
 
 
 def _moved(
-    part: _Part, angles: Sequence[int], steps: Array, shared: Array, deviations: Array
-) -> _Part:
+    window: _Window,
+    angles: Sequence[int],
+    steps: Array,
+    shared: Array,
+    deviations: Array,
+) -> _Window:
     """Return a window after steps are subtracted from all unknowns.
 
     Args:
-        part: The window.
+        window: The window.
         angles: The n - 3 angles that may change.
         steps: (T, n) the steps of the frames.
         shared: (s,) the step of the shared unknowns: factors, then turns of cameras.
         deviations: (s,) the standard deviations of the shared unknowns.
     """
-    count = len(part.factors)
-    body = part.body
+    count = len(window.factors)
+    body = window.body
     if count:
-        body = shaped(part.body, np.exp(-shared[:count]), part.height)
+        body = shaped(window.body, np.exp(-shared[:count]), window.height)
     turns = shared[count:].reshape(-1, 3)
-    cameras = part.cameras
+    cameras = window.cameras
     if len(turns):
         cameras = [turned_camera(*each) for each in zip(cameras, -turns, strict=True)]
-    poses = part.fitted.poses.copy()
+    poses = window.motion.poses.copy()
     poses[:, angles] -= np.clip(steps[:, 3:], -MAX_ANGLE_STEP, MAX_ANGLE_STEP)
-    fitted = replace(
-        part.fitted,
+    motion = replace(
+        window.motion,
         skeleton=body.skeleton,
         poses=poses,
-        translations=part.fitted.translations - steps[:, :3],
+        translations=window.motion.translations - steps[:, :3],
     )
     return replace(
-        part,
-        fitted=fitted,
+        window,
+        motion=motion,
         body=body,
-        factors=part.factors - shared[:count],
+        factors=window.factors - shared[:count],
         spread=deviations[:count],
         cameras=cameras,
-        turns=part.turns - turns,
+        turns=window.turns - turns,
     )
 
 
 def _frame_squares(
-    part: _Part, hessians: Array, gradients: Array, angles: Sequence[int]
+    window: _Window, hessians: Array, gradients: Array, angles: Sequence[int]
 ) -> Squares:
     """Return the squares of a step: the borders, and what is known without them.
 
     What is known: the root and the angles of each frame, roughly, and that standing
     feet do not move.
     """
-    fitted = part.fitted
-    estimate = part.estimate
-    visibility = part.visibility
-    squares = Squares(len(fitted), 3 + len(angles))
+    motion = window.motion
+    estimate = window.estimate
+    visibility = window.visibility
+    squares = Squares(len(motion), 3 + len(angles))
     of_angles = slice(3, 3 + len(angles))
     squares.add(slice(None), hessians, gradients)
     add_root(
@@ -422,38 +427,38 @@ def _frame_squares(
         estimate,
         visibility,
         CONTOUR_ROOT_DEVIATION,
-        fitted.translations - estimate.translations,
+        motion.translations - estimate.translations,
     )
-    change = wrapped(fitted.poses - estimate.poses)[:, angles]
+    change = wrapped(motion.poses - estimate.poses)[:, angles]
     squares.add(
         of_angles, np.eye(len(angles)) / ANGLE_DEVIATION**2, change / ANGLE_DEVIATION**2
     )
-    squares.add_bends(of_angles, change, fitted.fps**2 / ANGLE_ACCELERATION)
+    squares.add_bends(of_angles, change, motion.fps**2 / ANGLE_ACCELERATION)
     add_standing(
         squares,
-        fitted,
-        standing_feet(fitted.joints, fitted.fps, visibility.viewpoints),
+        motion,
+        standing_feet(motion.joints, motion.fps, visibility.viewpoints),
         angles,
     )
     return squares
 
 
-def _growth_by_view(part: _Part) -> list[Growth]:
+def _growth_by_view(window: _Window) -> list[Growth]:
     """Return how joints and radii change in each view with build and camera turns.
 
     A camera's turn is a factor too. It moves the joints that this camera sees.
     """
-    joints = part.fitted.joints
-    turns = part.turns.size
+    joints = window.motion.joints
+    turns = window.turns.size
     build = Growth(
         np.empty((len(joints), 0, *joints.shape[1:])), np.empty((0, len(BONES), 2))
     )
-    if len(part.factors):
-        build = growth(part.body, part.height, part.fitted)
+    if len(window.factors):
+        build = growth(window.body, window.height, window.motion)
     # turns change no radii
     radii = np.concatenate([build.radii, np.zeros((turns, len(BONES), 2))])
     views = []
-    for view, camera in enumerate(part.cameras):
+    for view, camera in enumerate(window.cameras):
         turned = np.zeros((len(joints), turns, *joints.shape[1:]))
         # a turned camera sees the world turned about its optical centre
         if turns:
