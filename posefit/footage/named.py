@@ -15,10 +15,10 @@ from posefit.motion.motion import Motion
 from posefit.reading import cut, quoted
 
 # what a user names for one camera: a motion or a file, masks (T, H, W), or image files
-Footage = Source | NDArray[Any] | tuple[Path, ...]
+OneSource = Source | NDArray[Any] | tuple[Path, ...]
 
 
-def sources_of(source: Any) -> list[Footage]:
+def sources_of(source: Any) -> list[OneSource]:
     """Return one source per camera.
 
     Args:
@@ -50,7 +50,7 @@ def sources_of(source: Any) -> list[Footage]:
     return [_view(each) for each in source] if frames is None else [frames]
 
 
-def _view(source: Any) -> Footage:
+def _view(source: Any) -> OneSource:
     """Return the source of one of several cameras."""
     if not isinstance(source, Sequence) or isinstance(source, str | Motion):
         (view,) = sources_of(source)

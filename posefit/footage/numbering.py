@@ -94,8 +94,13 @@ def numbered(images: Sequence[Path], name: str) -> Numbered:
         _check_each_once(images, numbers, name)
     steps = np.diff(numbers)
     rising = bool((steps > 0).all())
-    others = {(*part[:column], *part[column:][1:]) for part in parts}
-    if len(others) > 1 or not rising:
+    # names that differ in more than this number do not count frames by it alone
+    rests = set[tuple[str, ...]]()
+    for part in parts:
+        rest = list(part)
+        del rest[column]
+        rests.add(tuple(rest))
+    if len(rests) > 1 or not rising:
         listed = f"{name}: the frames are in the listed order, not by their numbers"
         return Numbered(list(images), [] if rising else [listed])
     step = int(np.gcd.reduce(steps))
@@ -206,9 +211,9 @@ def _changing(parts: Sequence[Sequence[str]]) -> list[int]:
     return changing
 
 
-def _spread(places: Mapping[int, Path], numbers: range, name: str) -> Numbered:
+def _spread(by_number: Mapping[int, Path], numbers: range, name: str) -> Numbered:
     """Return the image of each number; None for numbers without one."""
-    files = [places.get(number) for number in numbers]
+    files = [by_number.get(number) for number in numbers]
     missing = files.count(None)
     guesses = []
     if numbers.step > 1:

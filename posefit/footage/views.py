@@ -124,10 +124,10 @@ class View:
         return shows
 
 
-def joined(views: Sequence[View]) -> View:
+def concatenated(views: Sequence[View]) -> View:
     """Return one view of all frames of several views, in order, without pictures.
 
-    What some of the views do not know is None in the joined one, except for `known`.
+    What some of the views do not know is None in the result, except for `known`.
     """
     if any(view.known is not None for view in views):
         views = [_with_known(view) for view in views]
@@ -147,7 +147,7 @@ def _with_known(view: View) -> View:
     return replace(view, known=full_planes(len(view), view.size))
 
 
-def together(views: Sequence[View]) -> list[View]:
+def with_common_frames(views: Sequence[View]) -> list[View]:
     """Cut the views of several cameras to the frames that all of them have.
 
     Frames are compared by their numbers, if all cameras state them.
@@ -283,7 +283,7 @@ def known_planes(there: NDArray[np.bool_], size: tuple[int, int]) -> Planes | No
     return known
 
 
-def beyond(frames: Range, first: int, count: int) -> str:
+def range_warning(frames: Range, first: int, count: int) -> str:
     """Return a message if a range names frames that a source does not have, else "".
 
     Args:

@@ -26,12 +26,12 @@ LEAST_HEIGHT = 1e-9
 
 
 def world_of(
-    known: Sequence[Camera | Calibration], up: Up | None, unit: Unit | None
+    given: Sequence[Camera | Calibration], up: Up | None, unit: Unit | None
 ) -> tuple[Array, float, dict[str, str]]:
     """Return the axes and the unit of the cameras' world.
 
     Args:
-        known: The cameras. A `Camera` is upright and in metres already.
+        given: The cameras. A `Camera` is upright and in metres already.
         up: Which axis of the calibrations points up; None to guess it.
         unit: The calibrations' unit; None to guess it from their distances.
 
@@ -42,7 +42,7 @@ def world_of(
     Raises:
         InputError: A unit is given for a file that states another one.
     """
-    calibrations = [camera for camera in known if isinstance(camera, Calibration)]
+    calibrations = [camera for camera in given if isinstance(camera, Calibration)]
     guesses = dict[str, str]()
     if up is None and (guess := guessed_up(calibrations)):
         guesses["up"] = guess
@@ -120,7 +120,7 @@ Measured = Callable[[float], tuple[float, Array]]
 
 def unit_by_height(
     measured: Measured,
-    known: Sequence[Camera | Calibration],
+    given: Sequence[Camera | Calibration],
     metres: float,
     stature: float,
 ) -> _Fitted:
@@ -129,16 +129,16 @@ def unit_by_height(
     Args:
         measured: Measures the person, given the factor on the lengths of calibrations
             whose unit is a guess.
-        known: The cameras. A calibration may state that it is in metres, or that its
+        given: The cameras. A calibration may state that it is in metres, or that its
             unit may be any length if no usual one fits.
         metres: The unit guessed before, in metres.
         stature: The person's height in metres.
     """
-    if not any(has_guessed_unit(camera) for camera in known):
+    if not any(has_guessed_unit(camera) for camera in given):
         return _Fitted(1.0, "")
     _, tall = measured(1.0)
     height = float(np.median(tall))
-    all_guessed = all(has_guessed_unit(camera) for camera in known)
+    all_guessed = all(has_guessed_unit(camera) for camera in given)
     if not all_guessed:
         unit = _unit_beside_known(measured, metres, stature)
     elif height > 0.0:
@@ -147,7 +147,7 @@ def unit_by_height(
         # a person behind the cameras says nothing about the unit
         return _Fitted(1.0, "")
     factor = METRES[unit] / metres
-    is_free = any(getattr(camera, "scale", None) == "free" for camera in known)
+    is_free = any(getattr(camera, "scale", None) == "free" for camera in given)
     if is_free and all_guessed and disagreement(*measured(factor), stature):
         factor = stature / height
         length = f"{factor * metres:.4g} m"
