@@ -102,7 +102,7 @@ class Content:
         return self.scene.motion(self.frames)
 
     @cached_property
-    def blank(self) -> set[int]:
+    def unseen(self) -> set[int]:
         """The numbers, as filmed, of the frames that show nothing of the person."""
         return unseen(self.table)
 
@@ -113,7 +113,7 @@ class Content:
         Unknown joints are NaN.
         """
         points = self.motion.joints.reshape(len(self.frames), -1).T.copy()  # (81, T)
-        points[:, np.isin(self.table["frame"], list(self.blank))] = np.nan
+        points[:, np.isin(self.table["frame"], list(self.unseen))] = np.nan
         names = [f"{place}_{axis}" for place in PLACES for axis in "xyz"]
         columns: dict[str, Any] = dict(self.table)
         columns["activity"] = [frame.activity for frame in self.frames]
