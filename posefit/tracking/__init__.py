@@ -1,4 +1,4 @@
-"""Tracks a scene: searches a first pose, follows it, and writes files and figures.
+"""Tracks a scene: searches a first pose, follows it, and writes files.
 
     import posefit
     track = posefit.track("walk", view_degrees=90, seed=1)
@@ -14,5 +14,7 @@
 | the cost of a trajectory, and the choice between two | trajectory.py |
 | errors or signs of trust, at the end | evaluate.py, and `posefit.evaluation` |
 | the result | result.py |
+| where a track begins, and when it begins again | restarts.py |
+| a body that turns faster than a person can | spins.py |
 | live tracking, frame by frame | live.py |
 """

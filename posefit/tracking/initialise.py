@@ -1,6 +1,5 @@
 """Estimates before the first frame: its pose, by restarts, and the person's build."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -10,7 +9,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.driving import clocks
 from posefit.fitting.shape import NAMES, SPREAD, Shape, fit_shape
-from posefit.fitting.tracker import Follow, Frame, Observation, Task, guessed_modes
+from posefit.fitting.tracker import Follow, Frame, Observation, Task
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
@@ -26,11 +25,11 @@ from posefit.tracking.restarts import (
     TRIAL_STRIDE,
     best_restart,
     first_shown_whole,
+    guessed,
     usable_observations,
 )
 from posefit.tracking.smoothing.contours import fit_contours
 from posefit.tracking.smoothing.path import Visibility
-from posefit.uncertainty.modes import Posterior
 
 MIN_BODY_FRAMES = 5
 # Our choice: a walker hardly turns farther in this time than a search reaches, which is
@@ -120,8 +119,8 @@ def initialise(
         # the masks of one camera do not tell a tall person from a near one
         if height is None and len(scene.cameras) == 1 and task.translation == "aligned":
             height = task.body.stature
-        drawn = PoseCount()
-        with drawn.counting():
+        rasterised = PoseCount()
+        with rasterised.counting():
             shape, cameras = fitted_build(
                 task,
                 scene,
@@ -132,19 +131,9 @@ def initialise(
                 beta=method.audit.beta,
                 restarts=options.restarts or 0,
             )
-        effort["build"] = round(drawn.poses / len(scene.cameras))
+        effort["build"] = round(rasterised.poses / len(scene.cameras))
         task = replace(task, body=shape.body, cameras=cameras)
     return Initialised(task, shape, start, effort)
-
-
-def guessed(
-    task: Task, observation: Observation
-) -> tuple[Sequence[tuple[float, Posterior]], int]:
-    """Return modes of the poses that one picture may show, and their evaluations."""
-    drawn = PoseCount()
-    with drawn.counting():
-        modes = guessed_modes(task, observation)
-    return modes, math.ceil(drawn.poses / len(task.cameras))
 
 
 def fitted_build(

@@ -5,7 +5,7 @@
 | `initialise` | the first pose and the person's build | initialise.py |
 | `track_hypotheses` | the frames of each hypothesis, by the tracker | this one |
 | `cheapest` | the frames of the cheapest hypothesis | trajectory.py |
-| `retrack_spins` | frames tracked again if the body spins | restarts.py |
+| `retrack_spins` | frames tracked again if the body spins | spins.py |
 | `smooth` | footage: a smooth path, planted feet, fitted contours | smoothing/ |
 | `with_straight_legs` | one camera: straighter legs | smoothing/standing.py |
 | `with_cheapest_legs` | one camera: some frames' legs exchanged | smoothing/legs.py |
@@ -50,7 +50,6 @@ from posefit.tracking.restarts import (
     initial_guess,
     joined,
     relocalised,
-    retrack_spins,
     reversed_task,
     stream,
     tracked_again,
@@ -60,6 +59,7 @@ from posefit.tracking.smoothing.contours import Borders
 from posefit.tracking.smoothing.legs import with_cheapest_legs
 from posefit.tracking.smoothing.smooth import Smoothed, smooth
 from posefit.tracking.smoothing.standing import with_straight_legs
+from posefit.tracking.spins import retrack_spins
 from posefit.tracking.trajectory import (
     Hypothesis,
     Tracked,
@@ -222,8 +222,8 @@ def _without_spins(
     tracked = retrack_spins(
         task, scene.observations, tracked, method.follow, options.seed
     )
-    if tracked.stay is not None:
-        first, last = tracked.stay
+    if tracked.kept_run is not None:
+        first, last = tracked.kept_run
         progress.log(
             "the body turned faster than a person can: tracked again before frame "
             f"{first} and after frame {last}"
