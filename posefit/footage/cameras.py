@@ -80,7 +80,7 @@ def combined(
     if len(views) > 1:
         unit = metres, options.unit is None
         try:
-            cameras, guess = _of_one_size(
+            cameras, guess = _with_checked_unit(
                 observations, cameras, given, unit, body.stature
             )
         except NoPersonError as error:
@@ -135,14 +135,14 @@ def _straightened(
     return cameras, straight, notes
 
 
-def _of_one_size(
+def _with_checked_unit(
     observations: Observations,
     cameras: Sequence[Camera],
     given: Sequence[Camera | Calibration],
     unit: tuple[float, bool],
     stature: float,
 ) -> tuple[list[Camera], str]:
-    """Return cameras in which the person is about as tall as they are.
+    """Return cameras in a unit in which the person has about their height.
 
     Args:
         observations: What the cameras saw.

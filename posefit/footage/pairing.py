@@ -17,7 +17,7 @@ from posefit.reading import cut
 Pairing = tuple[int, ...]  # for each source, the index of its camera
 
 
-def listed(
+def read_cameras(
     cameras: Sequence[Camera | Calibration | str | Path],
 ) -> list[Camera | Calibration]:
     """Return cameras, after reading those that are files.
@@ -68,7 +68,7 @@ def calibrated(
     Raises:
         InputError: Cameras and views do not fit each other.
     """
-    known = listed(cameras)
+    known = read_cameras(cameras)
     views = len(filmed)
     if not known and views > 1:
         raise InputError(

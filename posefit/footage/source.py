@@ -18,7 +18,7 @@ from posefit.footage.cleaning import cleaned
 from posefit.footage.extraction import Extraction
 from posefit.footage.kinds import Resolved, resolve
 from posefit.footage.options import SourceOptions
-from posefit.footage.pairing import calibrated, listed
+from posefit.footage.pairing import calibrated, read_cameras
 from posefit.footage.scene import Scene, synthetic
 from posefit.footage.segmentation import Segmentation
 from posefit.footage.video import Video
@@ -63,7 +63,8 @@ def scene_of(
         scene = _of_footage(source, options, progress)
     if warning := range_warning(options.frames, scene.first, scene.count):
         scene = replace(scene, warnings=[*scene.warnings, warning])
-    return logged(scene, progress)
+    log_guesses(scene, progress)
+    return scene
 
 
 def _of_motion(source: Resolved, options: SourceOptions) -> Scene:
@@ -123,7 +124,7 @@ def _placed(
 
     `size` is used for calibrations that do not state theirs.
     """
-    given = listed(options.cameras)
+    given = read_cameras(options.cameras)
     world, metres, guesses = world_of(given, options.up, options.unit)
     cameras = list[Camera]()
     for each in given:
@@ -134,11 +135,10 @@ def _placed(
     return cameras, [*guesses.values()]
 
 
-def logged(scene: Scene, progress: Progress) -> Scene:
-    """Log the guesses of a scene, and return it."""
+def log_guesses(scene: Scene, progress: Progress) -> None:
+    """Log the guesses of a scene."""
     if scene.guesses:
         progress.log(f"guessed: {'; '.join(scene.guesses)}")
-    return scene
 
 
 def films_of(source: Resolved, width: int, fps: float | None = None) -> list[Video]:

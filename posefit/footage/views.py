@@ -58,7 +58,7 @@ class View:
     size: tuple[int, int]  # width and height
     fps: float | None = None  # None if the source does not state it
     # whether the source states its frame numbers; if not, they are counted from 0
-    counted: bool = False
+    states_numbers: bool = False
     # width and height of the film, if the masks were segmented from one
     filmed: tuple[int, int] | None = None
     # (T, 27, 3) as `Segmenter.landmarks`; None if the segmenter reports none
@@ -159,7 +159,7 @@ def with_common_frames(views: Sequence[View]) -> list[View]:
     starts = [int(view.numbers[0]) for view in views]
     stops = [int(view.numbers[-1]) + 1 for view in views]
     names = [view.name for view in views]
-    if not all(view.counted for view in views):
+    if not all(view.states_numbers for view in views):
         if len(set(starts)) > 1:
             each = zip(starts, names, strict=True)
             came = " and ".join(f"{first} of {name}" for first, name in each)

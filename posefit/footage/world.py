@@ -105,7 +105,7 @@ def has_guessed_unit(camera: Camera | Calibration) -> bool:
     return isinstance(camera, Calibration) and camera.scale != "metres"
 
 
-class _Fitted(NamedTuple):
+class _FittingUnit(NamedTuple):
     """The unit of calibrations that fits the person's height."""
 
     factor: float  # on the lengths of the calibrations
@@ -123,7 +123,7 @@ def unit_by_height(
     given: Sequence[Camera | Calibration],
     metres: float,
     stature: float,
-) -> _Fitted:
+) -> _FittingUnit:
     """Return the unit in which the person's height is about right.
 
     Args:
@@ -135,7 +135,7 @@ def unit_by_height(
         stature: The person's height in metres.
     """
     if not any(has_guessed_unit(camera) for camera in given):
-        return _Fitted(1.0, "")
+        return _FittingUnit(1.0, "")
     _, tall = measured(1.0)
     height = float(np.median(tall))
     all_guessed = all(has_guessed_unit(camera) for camera in given)
@@ -145,17 +145,17 @@ def unit_by_height(
         unit = unit_of_heights(height / metres / stature)
     else:
         # a person behind the cameras says nothing about the unit
-        return _Fitted(1.0, "")
+        return _FittingUnit(1.0, "")
     factor = METRES[unit] / metres
     is_free = any(getattr(camera, "scale", None) == "free" for camera in given)
     if is_free and all_guessed and disagreement(*measured(factor), stature):
         factor = stature / height
         length = f"{factor * metres:.4g} m"
         guess = f"the calibration's unit is {length}, by the person's height"
-        return _Fitted(factor, guess)
+        return _FittingUnit(factor, guess)
     if METRES[unit] == metres:
-        return _Fitted(factor, "")
-    return _Fitted(factor, f"the calibration is in {UNIT_NAMES[unit]}")
+        return _FittingUnit(factor, "")
+    return _FittingUnit(factor, f"the calibration is in {UNIT_NAMES[unit]}")
 
 
 def _unit_beside_known(measured: Measured, metres: float, stature: float) -> Unit:

@@ -98,11 +98,11 @@ def track(
     if scene is not None:
         _check_no_source_options(chosen)
     check_used(resolved.medium, chosen)
-    known = resolved.medium == "motion"
-    _check_for_kind(chosen, known, [*resolved.named, *chosen.train])
+    is_motion = resolved.medium == "motion"
+    _check_for_kind(chosen, is_motion, [*resolved.named, *chosen.train])
     named = resolved.named[0]
     followed = named if isinstance(named, str | Path | Motion) else None
-    chosen = completed(chosen, followed if known else None)
+    chosen = completed(chosen, followed if is_motion else None)
     # before the work, because a name may be wrong
     clips = training_clips(chosen.train, chosen.of_files, followed=followed)
     kinds = chosen_kinds(write)
@@ -213,11 +213,11 @@ def _resolved(source: OneSource | Scene | Resolved | Sequence[Any]) -> Resolved:
 
 
 def _check_for_kind(
-    options: TrackOptions, known: bool, motions: Sequence[OneSource]
+    options: TrackOptions, is_motion: bool, motions: Sequence[OneSource]
 ) -> None:
     """Raise InputError for an option that does not apply to the source.
 
-    Some options need .amc files, others a `known` truth. `motions` are all motions that
+    Some options need .amc files, others a known motion. `motions` are all motions that
     the track reads.
     """
     captured = any(map(_is_captured, motions))
@@ -227,7 +227,7 @@ def _check_for_kind(
         raise InputError(
             f"rate applies only to .amc files, got {quoted(options.rate)}: leave it out"
         )
-    if not known:
+    if not is_motion:
         if options.translation == "known":
             raise InputError(
                 "translation must be searched or aligned for footage, got known"

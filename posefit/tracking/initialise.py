@@ -64,7 +64,7 @@ class Initialised(NamedTuple):
     task: Task  # with the first pose, if it was searched
     shape: Shape | None  # the person's build, or None if it was not fitted
     # (2,) see `posefit.fitting.driving.clocks`, after the rasteriser was compiled
-    start: Array
+    start_clocks: Array
     effort: dict[str, int]  # evaluations of each stage
 
 
@@ -105,16 +105,8 @@ def initialise(
             log=progress.log,
         )
         effort["first_pose"] = sum(frame.evaluations for frame in tried)
-    body_frames = options.body_frames or 0
-    count = len(usable_observations(scene.observations, body_frames))
-    if body_frames and count < MIN_BODY_FRAMES:
-        few = f"{count} are too few"
-        if count < body_frames:
-            few = f"{count} of them show enough of the person"
-        needed = f"at least {MIN_BODY_FRAMES} are needed; the average build is used"
-        progress.log(f"no build is fitted to {body_frames} frames: {few}, {needed}")
-    elif body_frames:
-        progress.log(f"fitting the person's build to {body_frames} frames")
+    if options.body_frames and _has_enough(scene, options.body_frames, progress):
+        progress.log(f"fitting the person's build to {options.body_frames} frames")
         height = options.height
         # the masks of one camera do not tell a tall person from a near one
         if height is None and len(scene.cameras) == 1 and task.translation == "aligned":
@@ -125,7 +117,7 @@ def initialise(
                 task,
                 scene,
                 method.follow,
-                body_frames,
+                options.body_frames,
                 height,
                 options.seed,
                 beta=method.audit.beta,
@@ -134,6 +126,22 @@ def initialise(
         effort["build"] = round(rasterised.poses / len(scene.cameras))
         task = replace(task, body=shape.body, cameras=cameras)
     return Initialised(task, shape, start, effort)
+
+
+def _has_enough(scene: Scene, body_frames: int, progress: Progress) -> bool:
+    """Return whether a scene has usable frames for a build, and log it if not.
+
+    The build is to be fitted to `body_frames` frames, and needs `MIN_BODY_FRAMES`.
+    """
+    count = len(usable_observations(scene.observations, body_frames))
+    if count >= MIN_BODY_FRAMES:
+        return True
+    few = f"{count} are too few"
+    if count < body_frames:
+        few = f"{count} of them show enough of the person"
+    needed = f"at least {MIN_BODY_FRAMES} are needed; the average build is used"
+    progress.log(f"no build is fitted to {body_frames} frames: {few}, {needed}")
+    return False
 
 
 def fitted_build(

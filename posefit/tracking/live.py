@@ -20,7 +20,7 @@ from posefit.footage.live import Stream, live_views
 from posefit.footage.observations import Observations
 from posefit.footage.pairing import calibrated
 from posefit.footage.scene import Scene
-from posefit.footage.source import FilmedBody, logged
+from posefit.footage.source import FilmedBody, log_guesses
 from posefit.footage.straightening import straightening
 from posefit.footage.uses import check_used
 from posefit.footage.views import View, concatenated
@@ -123,7 +123,8 @@ def track_live(
         chosen = chosen.changed(fps=stream.rate)
     scene, observed = _scene_of(first, source, chosen)
     training = training_motions(clips, scene.fps)
-    scene = with_notes(logged(scene, progress), training)
+    log_guesses(scene, progress)
+    scene = with_notes(scene, training)
     for warning in scene.warnings:
         progress.warn(warning)
     waiting: deque[View] = deque()
