@@ -1,5 +1,8 @@
 """Tell the people in a film apart from frame to frame, and choose one to follow.
 
+A blob is a region of one frame. A tracklet is a person in successive frames, until they
+are lost. A person who is found again has several tracklets, their parts.
+
 A person is expected to keep their velocity, and about their size and colours. If people
 meet, one blob shows several of them. Pixels where only one person is expected belong to
 that person, and the rest of the blob is unknown.

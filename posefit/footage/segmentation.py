@@ -1,4 +1,12 @@
-"""Segment one person in a video."""
+"""Segment one person in a video.
+
+| value | what it does |
+|---|---|
+| `Extraction` | says how a person is segmented: the user's options |
+| `PersonSegmenter` | finds the people in one frame |
+| `Scanner` | goes once through a video, and tells its people apart: a `Scan` |
+| `Segmentation` | follows one of these people: a `Segmented` view |
+"""
 
 import math
 from collections.abc import Mapping, Sequence

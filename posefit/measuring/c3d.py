@@ -116,7 +116,8 @@ def _parameters(
 
 def _in_words(number: int) -> list[int]:
     """Return a number of 32 bits as two numbers of 16, the lower half first."""
-    return [number & MAX_FRAMES, number >> 16]
+    upper, lower = divmod(number, 1 << 16)
+    return [lower, upper]
 
 
 def _events(gait: Gait) -> Iterator[tuple[float, str, str]]:
