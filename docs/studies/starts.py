@@ -37,7 +37,7 @@ from posefit.motion import recorded
 from posefit.motion.built_in import average_skeleton
 from posefit.motion.clips import training_clips, training_motions
 from posefit.motion.motion import Motion
-from posefit.output.picture import ALTERNATIVES, MIN_WEIGHT
+from posefit.output.picture import ALTERNATIVES, MIN_ALTERNATIVE_WEIGHT
 from posefit.progress import QUIET
 from posefit.silhouette.mask import Mask
 from posefit.sweep.cell import ALL_AROUND, cell_scene
@@ -254,9 +254,9 @@ def single_images() -> None:
                     train=others,
                 )
             skeleton = fit.track.motion.skeleton
-            shown = other_modes(skeleton, fit.frame.modes, fit.pose, MIN_WEIGHT)[
-                :ALTERNATIVES
-            ]
+            shown = other_modes(
+                skeleton, fit.frame.modes, fit.pose, MIN_ALTERNATIVE_WEIGHT
+            )[:ALTERNATIVES]
             poses = np.array([fit.pose, *(mode.pose for mode in shown)])
             errors = image.errors_mm(skeleton.joints(poses))
             angles = image.turned_degrees(poses)

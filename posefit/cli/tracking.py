@@ -168,13 +168,13 @@ def _print(
     Then name the files to open, out of `hints`.
     """
     from posefit.output.files import WRITERS, chosen_kinds
-    from posefit.output.text import brief, table
+    from posefit.output.text import brief, detailed
 
     if as_json:
         click.echo(json.dumps({**content.summary, **more}))
         return
     if verbose:
-        click.echo(table(content))
+        click.echo(detailed(content))
     else:
         # the verdict comes first, in a colour, so that a bad track is not overlooked
         first, *others = brief(content)

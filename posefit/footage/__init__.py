@@ -26,6 +26,7 @@ Each row is one step, in one file:
 | one frame | the people in it | segmenter.py, extraction.py |
 | frames in their order | people, their masks and quality | scanner.py |
 | blobs of successive frames | people, and which one is followed | people.py |
+| people in their frames | an early end if the border always cuts them | edge.py |
 | a network's person in each frame | the same person in all frames | identities.py |
 | pictures | whether the camera moves | camera_motion.py |
 | a network's facings | which way the person faces | facing.py |
@@ -51,6 +52,14 @@ file of masks decodes them to an array, and returns `readers.view_of` it:
         return view_of(str(path), arrays, frames, label, fps)
 
     Kind("masks", _ends_in(".stack"), view=read_stack),
+
+The reader of a film returns a `Video`. If its frames fit in memory, that is short:
+
+    def read_frames(path, fps, width):
+        images = decoded(existing(path))  # T images (height, width, 3), blue first
+        return Video.of_images(images, path, fps, width)
+
+    Kind("pictures", _ends_in(".frames"), film=read_frames),
 
 Decoded masks are stored as bits at once, and a `View` never changes. What a source does
 not state is guessed in one of these files and listed in `Scene.guesses`. The next steps

@@ -22,7 +22,7 @@ from posefit.footage.observations import Observations
 from posefit.footage.options import SourceOptions
 from posefit.footage.people import Persons, Tracklet, part_at, paste
 from posefit.footage.scene import Scene
-from posefit.footage.straightening import fitting, straightening
+from posefit.footage.straightening import calibration_for, straightening
 from posefit.footage.views import View
 from posefit.footage.world import (
     LEAST_HEIGHT,
@@ -40,7 +40,7 @@ from posefit.silhouette.mask import Mask, Silhouette
 def combined(
     views: Sequence[View],
     body: Body,
-    known: Sequence[Camera | Calibration],
+    given: Sequence[Camera | Calibration],
     options: SourceOptions,
 ) -> Scene:
     """Return the scene of what cameras saw at the same times.
@@ -52,7 +52,7 @@ def combined(
     Args:
         views: What each camera saw.
         body: The person's body.
-        known: The cameras of `calibrated`. Empty for one view without a camera, which
+        given: The cameras of `calibrated`. Empty for one view without a camera, which
             gets a guess: level, 40 degrees across.
         options: `up` and `unit` of the calibrations, `fps`, and `view_degrees`: which
             way the person faces at first, relative to the first camera.
@@ -66,13 +66,13 @@ def combined(
     guesses = [guess for view in views for guess in view.guesses]
     if not stated and len(views[0]) > 1:
         guesses.append(f"{rate:g} frames a second")
-    if not known:
+    if not given:
         guesses.append(
             "a level camera, 40 degrees across: distances and sizes are only as good "
             "as this guess"
         )
-    world, metres, of_cameras = world_of(known, options.up, options.unit)
-    cameras, views, notes = _straightened(views, known, world, metres)
+    world, metres, of_cameras = world_of(given, options.up, options.unit)
+    cameras, views, notes = _straightened(views, given, world, metres)
     # several cameras distinguish front and back themselves
     facings = views[0].facings if len(views) == 1 else None
     yaws = yaws_of(() if facings is None else facings, cameras[0], rate)
@@ -80,8 +80,8 @@ def combined(
     if len(views) > 1:
         unit = metres, options.unit is None
         try:
-            cameras, guess = _of_one_size(
-                observations, cameras, known, unit, body.stature
+            cameras, guess = _with_checked_unit(
+                observations, cameras, given, unit, body.stature
             )
         except NoPersonError as error:
             raise NoPersonError(f"{name}: {error}") from None
@@ -99,7 +99,7 @@ def combined(
         anchor=place_of(first.silhouettes, cameras, body.stature),
         truth=None,
         observations=observations,
-        placing="given" if known else "guessed",
+        placing="given" if given else "guessed",
         warnings=[*warnings, *_unequal(views)],
         guesses=[*guesses, *notes, *of_cameras.values()],
         pictures=views[0].pictures,
@@ -110,44 +110,44 @@ def combined(
 
 def _straightened(
     views: Sequence[View],
-    known: Sequence[Camera | Calibration],
+    given: Sequence[Camera | Calibration],
     world: Array,
     metres: float,
 ) -> tuple[list[Camera], list[View], list[str]]:
     """Return cameras without distortion, what they saw, and sentences for the user.
 
-    A camera that is not known is level, 40 degrees across. `world` and `metres` are the
+    A camera that is not given is level, 40 degrees across. `world` and `metres` are the
     axes and the unit of the calibrations, see `world_of`.
     """
-    if not known:
+    if not given:
         guessed = Camera.around(np.zeros(3), 0.0, 0.0, views[0].size)
         return [guessed], [*views], []
     cameras = list[Camera]()
     straight = list[View]()
     notes = list[str]()
-    for each, view in zip(known, views, strict=True):
-        camera, how, camera_notes = straightening(
+    for each, view in zip(given, views, strict=True):
+        camera, correction, camera_notes = straightening(
             each, view.size, view.filmed, world, metres
         )
         cameras.append(camera)
-        straight.append(view if how is None else how.of(view))
+        straight.append(view if correction is None else correction.of(view))
         notes += camera_notes
     return cameras, straight, notes
 
 
-def _of_one_size(
+def _with_checked_unit(
     observations: Observations,
     cameras: Sequence[Camera],
-    known: Sequence[Camera | Calibration],
+    given: Sequence[Camera | Calibration],
     unit: tuple[float, bool],
     stature: float,
 ) -> tuple[list[Camera], str]:
-    """Return cameras in which the person is about as tall as they are.
+    """Return cameras in a unit in which the person has about their height.
 
     Args:
         observations: What the cameras saw.
         cameras: The cameras without distortion.
-        known: The same cameras as the user gave them.
+        given: The same cameras as the user gave them.
         unit: The unit of the calibrations in metres, and whether it is a guess.
         stature: The person's height in metres.
 
@@ -165,8 +165,8 @@ def _of_one_size(
     def scaled(factor: float) -> list[Camera]:
         """Return the cameras with lengths in a guessed unit times a factor."""
         result = list[Camera]()
-        for camera, given in zip(cameras, known, strict=True):
-            if has_guessed_unit(given):
+        for camera, as_given in zip(cameras, given, strict=True):
+            if has_guessed_unit(as_given):
                 camera = replace(camera, translation=factor * camera.translation)
             result.append(camera)
         return result
@@ -178,7 +178,7 @@ def _of_one_size(
     factor = 1.0
     guess = ""
     if is_guess:
-        factor, guess = unit_by_height(measured, known, metres, stature)
+        factor, guess = unit_by_height(measured, given, metres, stature)
     if wrong := disagreement(*measured(factor), stature):
         raise NoPersonError(wrong)
     return scaled(factor), guess
@@ -200,7 +200,7 @@ def _first_yaw(
 
 
 def same_person(
-    known: Sequence[Camera | Calibration],
+    given: Sequence[Camera | Calibration],
     first: View,
     size: tuple[int, int],
     persons: Persons,
@@ -213,7 +213,7 @@ def same_person(
     meet.
 
     Args:
-        known: The cameras of both views.
+        given: The cameras of both views.
         first: The first view, in which one person is followed.
         size: Width and height of the other view's masks.
         persons: The people in the other view.
@@ -221,10 +221,10 @@ def same_person(
     """
     fitted = list[Camera | Calibration]()
     cameras = list[Camera]()
-    films = zip(known, (first.size, size), (first.filmed, filmed), strict=True)
+    films = zip(given, (first.size, size), (first.filmed, filmed), strict=True)
     for camera, pixels, film in films:
         if isinstance(camera, Calibration):
-            camera = fitting(camera, film or pixels, scaled=film is None)
+            camera = calibration_for(camera, film or pixels, scaled=film is None)
             cameras.append(camera.camera(pixels, np.eye(3)))
         else:
             cameras.append(camera)
@@ -283,15 +283,15 @@ def _difference(misses: Sequence[float], heights: Sequence[Array]) -> float:
     return float(np.median(relative) + spread)
 
 
-def _extent(known: Camera | Calibration, silhouette: Silhouette) -> tuple[Array, float]:
+def _extent(given: Camera | Calibration, silhouette: Silhouette) -> tuple[Array, float]:
     """Return the middle (2,) of a silhouette without distortion, and its height.
 
     Both are in pixels.
     """
     middle, tall = extent_of(silhouette)
     height, width = silhouette.mask.shape
-    if not isinstance(known, Camera):
-        middle = known.straightened(np.array([*middle, 0.0]), (width, height))[:2]
+    if not isinstance(given, Camera):
+        middle = given.straightened(np.array([*middle, 0.0]), (width, height))[:2]
     return middle, tall
 
 

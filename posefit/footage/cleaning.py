@@ -1,5 +1,6 @@
 """Clean masks from other tools: invert them, fill holes, and follow one person."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -8,9 +9,10 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.footage.choice import Choice
-from posefit.footage.people import Chooser, People, planes_of
+from posefit.footage.people import Chooser, People, Tracklet, planes_of
 from posefit.footage.views import (
     MOST,
+    Planes,
     View,
     border_of,
     empty_planes,
@@ -61,45 +63,79 @@ def cleaned(
     if not usable.any():
         raise _no_person(view)
     people = People(view.fps or FPS)
-    bits = empty_planes(count, view.size)
-    areas = np.zeros(count)
-    cut = np.zeros(count, dtype=bool)
-
-    def store(k: int, mask: Mask) -> None:
-        bits[k] = np.packbits(mask)
-        release(bits, k)
-        areas[k] = mask.sum()
-        cut[k] = usable[k] and touches_border(mask)
-
+    clean = _CleanMasks(view)
     for k in range(count):
         silhouette = _silhouette(view, k, inverted)
         masks = _people(silhouette) if usable[k] else []
         people.add(masks)
         mask = without_holes(masks[0], holes) if masks else silhouette.mask
-        store(k, mask & silhouette.valid)
+        clean.store(k, mask & silhouette.valid)
+
+    # only a look at all frames shows that there are several people
     parts, several = people.chosen(choice, lambda frame: f"frame {view.numbers[frame]}")
     known = view.known
-    # Only a look at all frames shows that there are several people. The masks of the
-    # one who is followed then replace the masks stored above.
     if several:
         warnings.append(f"{view.name}: {several}")
-        before = full_planes(count, view.size) if known is None else known
-        known = empty_planes(count, view.size)
-        known[:] = before
         others = people.others(parts)
-        for k in np.flatnonzero(usable).tolist():
-            mask, valid = planes_of(parts, others, k, unpacked(before[k], view.size))
-            store(k, without_holes(mask, holes) & valid)
-            known[k] = np.packbits(valid)
-            release(known, k)
-    usable = usable & (areas > 0)
+        frames = np.flatnonzero(usable).tolist()
+        known = _replaced(clean, view, parts, others, frames, holes)
+
+    usable = usable & (clean.areas > 0)
     return replace(
         view,
-        bits=bits,
+        bits=clean.bits,
         known=known,
-        usable=usable & _shows_enough(usable, areas, cut),
+        usable=usable & _shows_enough(usable, clean.areas, clean.cut),
         warnings=warnings,
     )
+
+
+class _CleanMasks:
+    """The cleaned masks of a view."""
+
+    def __init__(self, view: View) -> None:
+        self.bits = empty_planes(len(view), view.size)
+        self.areas = np.zeros(len(view))  # (T,) pixels of the person
+        # (T,) whether the picture's edge cuts the person
+        self.cut = np.zeros(len(view), dtype=bool)
+
+    def store(self, k: int, mask: Mask) -> None:
+        """Store the mask of frame k, also in place of an earlier one."""
+        self.bits[k] = np.packbits(mask)
+        release(self.bits, k)
+        self.areas[k] = mask.sum()
+        self.cut[k] = touches_border(mask)
+
+
+def _replaced(
+    clean: _CleanMasks,
+    view: View,
+    parts: Sequence[Tracklet],
+    others: Sequence[Tracklet],
+    frames: Sequence[int],
+    holes: float,
+) -> Planes:
+    """Replace the masks of frames by those of one person; return what is known then.
+
+    Args:
+        clean: The masks.
+        view: The view that they are from.
+        parts: The parts of the person.
+        others: The parts of all other people, whose pixels become unknown.
+        frames: The frames, counted from 0.
+        holes: As for `cleaned`.
+    """
+    before = view.known
+    if before is None:
+        before = full_planes(len(view), view.size)
+    known = empty_planes(len(view), view.size)
+    known[:] = before
+    for k in frames:
+        mask, valid = planes_of(parts, others, k, unpacked(before[k], view.size))
+        clean.store(k, without_holes(mask, holes) & valid)
+        known[k] = np.packbits(valid)
+        release(known, k)
+    return known
 
 
 def _no_person(view: View) -> InputError:

@@ -23,7 +23,7 @@ from posefit.footage.scene import observed_views
 from posefit.footage.segmentation import Segmentation
 from posefit.footage.source import films_of, scene_of, views_of_masks
 from posefit.footage.uses import useless_for
-from posefit.footage.views import Range, View, beyond, border_of
+from posefit.footage.views import Range, View, border_of, range_warning
 from posefit.footage.writing import VideoWriter
 from posefit.motion.clips import FPS
 from posefit.silhouette.foreground import Image
@@ -100,7 +100,7 @@ def extract(
 
 def _warned(view: View, frames: Range) -> View:
     """Return a view that warns of chosen frames that the source does not have."""
-    warning = beyond(frames, int(view.numbers[0]), len(view))
+    warning = range_warning(frames, int(view.numbers[0]), len(view))
     # the scene of a motion warns, too
     if not warning or warning in view.warnings:
         return view

@@ -21,7 +21,7 @@ from posefit.errors import InputError
 from posefit.files import opencv_name
 from posefit.footage.annotations import ANNOTATIONS, read_annotations
 from posefit.footage.images import IMAGES, is_photo, page_count
-from posefit.footage.named import Footage, sources_of
+from posefit.footage.named import OneSource, sources_of
 from posefit.footage.numbering import Images, images_in, numbered_together
 from posefit.footage.readers import (
     ARRAYS,
@@ -71,78 +71,83 @@ UNREAD = (
         f"and motions as {' and '.join(MOTIONS)}",
     ),
 )
-# what a source contains: a motion, masks, a video file, or pictures of a film
+# what a source contains: a motion, masks, a video whose file states its rate, or
+# pictures of a film whose rate a user may state
 Medium = Literal["motion", "masks", "video", "pictures"]
-# where a source is, by `_place`: images are listed, and other names are not opened
-Place = Motion | str | Path | Images | NDArray[Any]
+# what a reader takes, by `_material_of`: the images of a folder are listed, and files
+# are not opened yet
+Material = Motion | str | Path | Images | NDArray[Any]
 
 
 class Kind(NamedTuple):
-    """A kind of source and its reader: `view` for masks, `film` for pictures.
+    """A kind of source and its reader: `view` for masks, `film` for other footage.
 
-    A motion has neither; `load_motion` reads it.
+    A motion has neither, because `motion.clips` reads motions and their files.
     """
 
     medium: Medium
-    recognises: Callable[[Place], bool]
-    # takes (place, frames, label or category, fps), and returns the view
+    recognises: Callable[[Material], bool]
+    # takes (material, frames, label or category, fps), and returns the view
     view: Callable[[Any, Range, Any, float | None], View] | None = None
-    # takes (place, fps, width), and returns the film, scaled down to the width
+    # takes (material, fps, width), and returns the film, scaled down to the width
     film: Callable[[Any, float | None, int], Video] | None = None
-    # takes (place, fps), and returns the number of the first frame; None if frames are
-    # counted from 0
+    # takes (material, fps), and returns the number of the first frame; None if frames
+    # are counted from 0
     first: Callable[[Any, float | None], int] | None = None
     has_categories: bool = False  # whether a label may be a category's name
 
 
-def _is_film(place: Place) -> bool:
+def _is_film(material: Material) -> bool:
     """Return whether images are a film: several pictures, the first in many colours."""
-    if not isinstance(place, Images):
+    if not isinstance(material, Images):
         return False
-    first = place.files[0]
-    return is_photo(first) and (len(place.files) > 1 or page_count(first) > 1)
+    first = material.files[0]
+    return is_photo(first) and (len(material.files) > 1 or page_count(first) > 1)
 
 
-def _is_video(place: Place) -> bool:
+def _is_video(material: Material) -> bool:
     """Return whether a file may be a video: any suffix that has no other meaning.
 
     Raises InputError for the suffixes in `UNREAD`.
     """
-    if not isinstance(place, Path):
+    if not isinstance(material, Path):
         return False
-    suffix = place.suffix.lower()
+    suffix = material.suffix.lower()
     for unread in UNREAD:
         if suffix in unread.suffixes:
             raise InputError(
-                f"{existing(place)}: {unread.what} of {suffix} are not read; "
+                f"{existing(material)}: {unread.what} of {suffix} are not read; "
                 f"{unread.instead} are"
             )
     return suffix not in ("", *NO_VIDEO)
 
 
-def _ends_in(suffix: str) -> Callable[[Place], bool]:
-    return lambda place: isinstance(place, Path) and place.suffix.lower() == suffix
+def _ends_in(suffix: str) -> Callable[[Material], bool]:
+    return lambda material: (
+        isinstance(material, Path) and material.suffix.lower() == suffix
+    )
 
 
-def _first_of_motion(place: Place, fps: float | None) -> int:
+def _first_of_motion(material: Material, fps: float | None) -> int:
     """Return the number of a motion's first frame, which only a cut motion states."""
-    return place.first_at(fps or FPS) if isinstance(place, Motion) else 0
+    return material.first_at(fps or FPS) if isinstance(material, Motion) else 0
 
 
-# the first kind that recognises a source reads it
+# The first kind that recognises a source reads it. A new kind goes before the video,
+# which takes files of every suffix, and the motion, which takes every name.
 KINDS = (
-    Kind("masks", lambda place: isinstance(place, np.ndarray), view=read_array),
+    Kind("masks", lambda material: isinstance(material, np.ndarray), view=read_array),
     Kind(
         "masks",
         _ends_in(".npz"),
         view=read_npz,
-        first=lambda place, _: first_number(place),
+        first=lambda material, _: first_number(material),
     ),
     Kind("masks", _ends_in(".npy"), view=read_npy),
     Kind("masks", _ends_in(ANNOTATIONS), view=read_annotations, has_categories=True),
     Kind("pictures", _is_film, film=Video.of_pictures),
-    Kind("masks", lambda place: isinstance(place, Images), view=read_images),
-    Kind("video", _is_video, film=lambda place, _, width: Video.of(place, width)),
+    Kind("masks", lambda material: isinstance(material, Images), view=read_images),
+    Kind("video", _is_video, film=lambda material, _, width: Video.of(material, width)),
     Kind("motion", lambda _: True, first=_first_of_motion),  # names need no suffix
 )
 
@@ -152,9 +157,9 @@ class Resolved:
     """A source whose kind is known and whose files are found. Made by `resolve`."""
 
     medium: Medium
-    named: Sequence[Footage]  # what the user named, one per camera
+    named: Sequence[OneSource]  # what the user named, one per camera
     names: Sequence[str]  # what messages call each
-    places: Sequence[Place]  # where each is
+    materials: Sequence[Material]  # what the reader of each takes
     kinds: Sequence[Kind]  # what reads each
 
 
@@ -176,8 +181,8 @@ def resolve(source: Any) -> Resolved:
         if isinstance(each, str | Path | tuple):
             opencv_name(each[0] if isinstance(each, tuple) else each)
     _check_each_once(named)
-    places = [_place(each) for each in named]
-    kinds = [_kind_of(place) for place in places]
+    materials = [_material_of(each) for each in named]
+    kinds = [_kind_of(material) for material in materials]
     media = {kind.medium for kind in kinds}
     if len(media) > 1:
         raise InputError(
@@ -189,12 +194,12 @@ def resolve(source: Any) -> Resolved:
             "source must be one motion, or views of one person, "
             f"got {len(named)} motions"
         )
-    places = _with_numbers(places)
-    names = [_name_of(place) for place in places]
-    return Resolved(medium, named, names, places, kinds)
+    materials = _with_numbers(materials)
+    names = [_name_of(material) for material in materials]
+    return Resolved(medium, named, names, materials, kinds)
 
 
-def _check_each_once(named: Sequence[Footage]) -> None:
+def _check_each_once(named: Sequence[OneSource]) -> None:
     """Raise InputError if two cameras have the same source."""
     earlier = list[Any]()
     for each in named:
@@ -214,25 +219,25 @@ def _is_same(one: Any, other: Any) -> bool:
     return isinstance(one, Path | tuple) and type(one) is type(other) and one == other
 
 
-def _kind_of(place: Place) -> Kind:
+def _kind_of(material: Material) -> Kind:
     """Return the first kind that recognises a source. The last one takes anything."""
-    return next(kind for kind in KINDS if kind.recognises(place))
+    return next(kind for kind in KINDS if kind.recognises(material))
 
 
-def _with_numbers(places: Sequence[Place]) -> list[Place]:
-    """Return places whose images are in the order of the numbers in their names.
+def _with_numbers(materials: Sequence[Material]) -> list[Material]:
+    """Return materials whose images are in the order of the numbers in their names.
 
     Cameras are paired by these numbers if all of them have images. If another camera
     has an .npz file, say, each camera's images are numbered alone.
     """
-    images = [place for place in places if isinstance(place, Images)]
-    if len(images) == len(places):
+    images = [material for material in materials if isinstance(material, Images)]
+    if len(images) == len(materials):
         return [*numbered_together(images)]
-    numbered = list[Place]()
-    for place in places:
-        if isinstance(place, Images):
-            (place,) = numbered_together([place])
-        numbered.append(place)
+    numbered = list[Material]()
+    for material in materials:
+        if isinstance(material, Images):
+            (material,) = numbered_together([material])
+        numbered.append(material)
     return numbered
 
 
@@ -244,14 +249,14 @@ def first_of(source: Resolved, fps: float | None = None) -> int:
         fps: Frames per second, at which a motion is resampled.
     """
     first = 0
-    for kind, place in zip(source.kinds, source.places, strict=True):
+    for kind, material in zip(source.kinds, source.materials, strict=True):
         if kind.first is not None:
-            first = max(first, kind.first(place, fps))
+            first = max(first, kind.first(material, fps))
     return first
 
 
-def _place(source: Footage) -> Place:
-    """Return where a source is.
+def _material_of(source: OneSource) -> Material:
+    """Return what the reader of a source takes.
 
     The name of a built-in motion is never taken for a folder. A path with a separator
     and without a suffix is a folder, even if it does not exist. Raises InputError for a
@@ -300,8 +305,8 @@ def _images_of_folder(folder: Path) -> Images:
     return Images(str(folder), tuple(images))
 
 
-def _name_of(place: Place) -> str:
+def _name_of(material: Material) -> str:
     """Return what messages call a source."""
-    if isinstance(place, Images | Motion):
-        return place.name
-    return "masks" if isinstance(place, np.ndarray) else str(place)
+    if isinstance(material, Images | Motion):
+        return material.name
+    return "masks" if isinstance(material, np.ndarray) else str(material)

@@ -15,10 +15,10 @@ from posefit.motion.motion import Motion
 from posefit.reading import cut, quoted
 
 # what a user names for one camera: a motion or a file, masks (T, H, W), or image files
-Footage = Source | NDArray[Any] | tuple[Path, ...]
+OneSource = Source | NDArray[Any] | tuple[Path, ...]
 
 
-def sources_of(source: Any) -> list[Footage]:
+def sources_of(source: Any) -> list[OneSource]:
     """Return one source per camera.
 
     Args:
@@ -47,14 +47,14 @@ def sources_of(source: Any) -> list[Footage]:
     if not source:
         raise InputError("source must not be an empty list")
     frames = _frames(source)
-    return [_view(each) for each in source] if frames is None else [frames]
+    return [_source_of_camera(each) for each in source] if frames is None else [frames]
 
 
-def _view(source: Any) -> Footage:
+def _source_of_camera(source: Any) -> OneSource:
     """Return the source of one of several cameras."""
     if not isinstance(source, Sequence) or isinstance(source, str | Motion):
-        (view,) = sources_of(source)
-        return view
+        (only,) = sources_of(source)
+        return only
     frames = _frames(source) if source else None
     if frames is None:
         raise InputError(

@@ -91,11 +91,16 @@ def numbered(images: Sequence[Path], name: str) -> Numbered:
         return Numbered(list(images), [])
     numbers = [int(part[column]) for part in parts]
     if _texts_differ(parts):
-        _check_each_once(images, numbers, name)
+        _check_one_per_number(images, numbers, name)
     steps = np.diff(numbers)
     rising = bool((steps > 0).all())
-    others = {(*part[:column], *part[column:][1:]) for part in parts}
-    if len(others) > 1 or not rising:
+    # names that differ in more than this number do not count frames by it alone
+    rests = set[tuple[str, ...]]()
+    for part in parts:
+        rest = list(part)
+        del rest[column]
+        rests.add(tuple(rest))
+    if len(rests) > 1 or not rising:
         listed = f"{name}: the frames are in the listed order, not by their numbers"
         return Numbered(list(images), [] if rising else [listed])
     step = int(np.gcd.reduce(steps))
@@ -148,7 +153,7 @@ def _check_one_a_frame(
         return
     columns = _changing(parts)
     if len(columns) == 1 and len({file.parent for file in images}) > 1:
-        _check_each_once(images, [int(part[columns[0]]) for part in parts], name)
+        _check_one_per_number(images, [int(part[columns[0]]) for part in parts], name)
     if len(columns) != 2:
         return
     values = {column: [int(part[column]) for part in parts] for column in columns}
@@ -158,10 +163,12 @@ def _check_one_a_frame(
         is_named = _NO_FRAME.search(parts[0][column - 1])
         is_few = column > other and objects < frames and objects <= MOST_OBJECTS
         if (is_named or is_few) and 2 * len(images) >= objects * frames:
-            _check_each_once(images, values[other], name)
+            _check_one_per_number(images, values[other], name)
 
 
-def _check_each_once(images: Sequence[Path], numbers: Sequence[int], name: str) -> None:
+def _check_one_per_number(
+    images: Sequence[Path], numbers: Sequence[int], name: str
+) -> None:
     """Raise InputError if two images have the same number."""
     first = dict[int, Path]()
     for number, image in zip(numbers, images, strict=True):
@@ -206,9 +213,9 @@ def _changing(parts: Sequence[Sequence[str]]) -> list[int]:
     return changing
 
 
-def _spread(places: Mapping[int, Path], numbers: range, name: str) -> Numbered:
+def _spread(by_number: Mapping[int, Path], numbers: range, name: str) -> Numbered:
     """Return the image of each number; None for numbers without one."""
-    files = [places.get(number) for number in numbers]
+    files = [by_number.get(number) for number in numbers]
     missing = files.count(None)
     guesses = []
     if numbers.step > 1:
@@ -233,26 +240,26 @@ def numbered_together(cameras: Sequence[Images]) -> list[Images]:
     """
     names = [camera.name for camera in cameras]
     listed = [numbered(camera.files, camera.name) for camera in cameras]
-    known = [view.numbers for view in listed if view.numbers is not None]
+    known = [images.numbers for images in listed if images.numbers is not None]
     if len(cameras) > 1 and len(known) == len(listed):
         listed = _paired(listed, known, names)
     elif len(cameras) > 1:
         _guess_order(listed, names)
     return [
-        camera._replace(numbered=view)
-        for camera, view in zip(cameras, listed, strict=True)
+        camera._replace(numbered=images)
+        for camera, images in zip(cameras, listed, strict=True)
     ]
 
 
 def _guess_order(listed: list[Numbered], names: Sequence[str]) -> None:
     """Add the guess that images are paired in their order, if there are several."""
-    for k, view in enumerate(listed):
-        if len(view.files) > 1:
+    for k, images in enumerate(listed):
+        if len(images.files) > 1:
             in_order = (
                 f"images of {' and '.join(names)} are paired in the order of their "
                 "names, because not all of these contain the number of a frame"
             )
-            listed[k] = view._replace(guesses=[*view.guesses, in_order])
+            listed[k] = images._replace(guesses=[*images.guesses, in_order])
             return
 
 
@@ -263,7 +270,7 @@ def _paired(
 
     `known` are the numbers of each camera. Raises InputError if they share none.
     """
-    shared = set.intersection(*(set(_by_number(view)) for view in listed))
+    shared = set.intersection(*(set(_by_number(images)) for images in listed))
     if not shared:
         came = " and ".join(
             f"{numbers[0]} to {numbers[-1]} of {name}"
@@ -280,13 +287,13 @@ def _paired(
     offsets = [numbers[0] - lowest for numbers in known]
     every = range(lowest, highest + 1, math.gcd(*steps, *offsets))
     return [
-        _spread(_by_number(view), every, name)
-        for view, name in zip(listed, names, strict=True)
+        _spread(_by_number(images), every, name)
+        for images, name in zip(listed, names, strict=True)
     ]
 
 
-def _by_number(view: Numbered) -> dict[int, Path]:
+def _by_number(images: Numbered) -> dict[int, Path]:
     """Return the images of a camera by their numbers."""
-    assert view.numbers is not None
-    numbers = zip(view.numbers, view.files, strict=True)
+    assert images.numbers is not None
+    numbers = zip(images.numbers, images.files, strict=True)
     return {number: file for number, file in numbers if file is not None}

@@ -9,7 +9,7 @@ import numpy as np
 from posefit.errors import InputError
 from posefit.footage.images import IMAGES
 from posefit.footage.readers import ARRAYS
-from posefit.footage.straightening import fitting
+from posefit.footage.straightening import calibration_for
 from posefit.geometry.calibration import Calibration, read_calibrations
 from posefit.geometry.camera import Camera
 from posefit.reading import cut
@@ -17,7 +17,7 @@ from posefit.reading import cut
 Pairing = tuple[int, ...]  # for each source, the index of its camera
 
 
-def listed(
+def read_cameras(
     cameras: Sequence[Camera | Calibration | str | Path],
 ) -> list[Camera | Calibration]:
     """Return cameras, after reading those that are files.
@@ -68,7 +68,7 @@ def calibrated(
     Raises:
         InputError: Cameras and views do not fit each other.
     """
-    known = listed(cameras)
+    known = read_cameras(cameras)
     views = len(filmed)
     if not known and views > 1:
         raise InputError(
@@ -96,7 +96,7 @@ def calibrated(
         known = [known[k] for k in order_by_name(known, names)]
     for camera, size in zip(known, filmed, strict=False):
         if isinstance(camera, Calibration) and size is not None:
-            fitting(camera, size, scaled=False)
+            calibration_for(camera, size, scaled=False)
     return known
 
 

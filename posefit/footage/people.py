@@ -1,5 +1,8 @@
 """Tell the people in a film apart from frame to frame, and choose one to follow.
 
+A blob is a region of one frame. A tracklet is a person in successive frames, until they
+are lost. A person who is found again has several tracklets, their parts.
+
 A person is expected to keep their velocity, and about their size and colours. If people
 meet, one blob shows several of them. Pixels where only one person is expected belong to
 that person, and the rest of the blob is unknown.
@@ -41,7 +44,7 @@ HALVING_SECONDS = 1.0  # a gap of this many seconds halves the weight of a dista
 UNREACHABLE = 1e6  # heights: replaces infinity, which the assignment does not accept
 
 
-class Cut(NamedTuple):
+class Patch(NamedTuple):
     """The pixels of a mask: its box, and the bits in it."""
 
     box: tuple[slice, slice]
@@ -51,24 +54,27 @@ class Cut(NamedTuple):
 class Detection(NamedTuple):
     """What a frame shows of a person."""
 
-    shown: Cut  # the person's mask
-    hidden: Cut | None  # unknown pixels, where others are too; None for a person alone
+    shown: Patch  # the person's mask
+    hidden: (
+        Patch | None
+    )  # unknown pixels, where others are too; None for a person alone
 
 
-Persons = list[list["Tracklet"]]  # the parts of each person
+# the parts of each person: a person who was lost and found again has several tracklets
+Persons = list[list["Tracklet"]]
 Chooser = Callable[[Persons], int]  # returns the number of one of several people
 
 
-def cut_out(mask: Mask) -> Cut:
-    """Return the pixels of a mask as bits of their bounding box."""
+def patch_of(mask: Mask) -> Patch:
+    """Return the patch of a mask: the bits in its bounding box."""
     box = padded_box(mask, 0)
-    return Cut(box, np.packbits(mask[box]))
+    return Patch(box, np.packbits(mask[box]))
 
 
-def paste(cut: Cut, mask: Mask) -> None:
-    """Set the pixels of a cut in a mask, in place."""
-    part = mask[cut.box]
-    part |= unpacked(cut.bits, part.shape[::-1])
+def paste(patch: Patch, mask: Mask) -> None:
+    """Set the pixels of a patch in a mask, in place."""
+    inside = mask[patch.box]
+    inside |= unpacked(patch.bits, inside.shape[::-1])
 
 
 class _Blob:
@@ -152,7 +158,7 @@ class Tracklet:
         self.alone += 1
         self.last = frame
         self.latest = blob
-        self.detections[frame] = Detection(cut_out(blob.mask), None)
+        self.detections[frame] = Detection(patch_of(blob.mask), None)
 
     def end(self) -> None:
         """Free what only later frames need, or memory would grow with noise."""
@@ -403,7 +409,7 @@ def _share(blob: _Blob, group: Sequence[Tracklet], frame: int) -> None:
     for tracklet, outline in zip(group, outlines, strict=True):
         clear = blob.mask & outline & (count == 1)
         hidden = blob.mask & ~clear
-        tracklet.detections[frame] = Detection(cut_out(clear), cut_out(hidden))
+        tracklet.detections[frame] = Detection(patch_of(clear), patch_of(hidden))
 
 
 def part_at(parts: Sequence[Tracklet], frame: int) -> Tracklet | None:
@@ -480,11 +486,11 @@ def person_indices(persons: Persons, masks: Iterable[Mask]) -> list[int | None]:
     return result
 
 
-def _common(cut: Cut, mask: Mask) -> tuple[int, int]:
-    """Return how many pixels a cut has, and how many of them a mask has, too."""
-    part = mask[cut.box]
-    own = unpacked(cut.bits, part.shape[::-1])
-    return int(own.sum()), int((part & own).sum())
+def _common(patch: Patch, mask: Mask) -> tuple[int, int]:
+    """Return how many pixels a patch has, and how many of them a mask has, too."""
+    inside = mask[patch.box]
+    own = unpacked(patch.bits, inside.shape[::-1])
+    return int(own.sum()), int((inside & own).sum())
 
 
 def replace_detection(
@@ -494,7 +500,7 @@ def replace_detection(
     part = part_at(parts, frame) or parts[0]
     before = part.detections.get(frame)
     hidden = None if before is None else before.hidden
-    part.detections[frame] = Detection(cut_out(mask), hidden)
+    part.detections[frame] = Detection(patch_of(mask), hidden)
     part.rows[frame] = row
 
 
@@ -522,9 +528,9 @@ def excluded_mask(
     if part is None:
         return mask
     own = np.zeros_like(mask)
-    for cut in part.detections[frame]:
-        if cut is not None:
-            paste(cut, own)
+    for patch in part.detections[frame]:
+        if patch is not None:
+            paste(patch, own)
     mask &= ~own
     near = np.zeros_like(mask)
     near[padded_box(own, round(SEARCH_REACH * part.height))] = True

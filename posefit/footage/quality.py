@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import cv2
 import numpy as np
@@ -239,53 +239,86 @@ def verdict(
         learned: Whether the segmenter learned the background from the video itself, and
             not from a picture of the empty scene.
     """
+    instead = advice(method, learned=learned)
+
+    def poor(text: str, refused: bool) -> Verdict:
+        return Verdict(f"{text}{instead}", refused)
+
     whole = [row for row in rows if row["area"] and not row["touches_border"]]
     usable = sum(row["usable"] for row in whole)
-    instead = advice(method, learned=learned)
-    none = f"expected masks of a person, got none in any of {len(rows)} frames{instead}"
+    nobody = poor(
+        f"expected masks of a person, got none in any of {len(rows)} frames", True
+    )
     cut = sum(bool(row["touches_border"]) for row in rows)
     if cut > MOST * len(rows):
-        none = at_edge(cut, len(rows))
+        nobody = Verdict(at_edge(cut, len(rows)), True)
     if len(whole) < MIN_DETECTIONS:
-        return None if usable else Verdict(none, True)
-    outside = float(np.median([row["beside"] for row in whole]))
-    pairs = [(a, b) for a, b in pairwise(whole) if b["frame"] == a["frame"] + 1]
-    taller = _change(pairs, "longer_side")
-    larger = _change(pairs, "area")
-    unsteady = taller > UNSTEADY_SIDE or larger > UNSTEADY_AREA
-    ghosts = float(np.mean([row["ghost"] for row in whole]))
-    broken = float(np.mean([row["pieces"] > 1 for row in whole]))
-    moves = f"{outside:.0%} of what moves"
-    changes = f"change by {larger:.0%} from frame to frame"
-    if outside > UNEXPLAINED_SHARE and unsteady:
+        return None if usable else nobody
+
+    signs = _Signs.of(whole)
+    changes = f"change by {signs.area_change:.0%} from frame to frame"
+    moves = f"{signs.outside:.0%} of what moves"
+    if signs.is_unexplained and signs.is_unsteady:
         where = "the masks do not show the whole person"
         if learned:
             where = "the person seems to stand in the background"
-        text = f"{where}: {moves} lies outside the masks, and they {changes}"
-        refused = True
-    elif ghosts > GHOST_SHARE:
-        text = (
-            f"{ghosts:.0%} of the masks show a place that is empty now: the person was "
-            "learned into the background"
+        return poor(
+            f"{where}: {moves} lies outside the masks, and they {changes}", True
         )
-        refused = ghosts > MOST
-    elif not usable:
-        return Verdict(none, True)
-    elif unsteady:
+    if signs.ghosts > GHOST_SHARE:
+        empty = f"{signs.ghosts:.0%} of the masks show a place that is empty now"
+        return poor(
+            f"{empty}: the person was learned into the background", signs.ghosts > MOST
+        )
+    if not usable:
+        return nobody
+    if signs.is_unsteady:
         pieces = ""
-        if broken > MOST:
-            pieces = f" and are in pieces in {broken:.0%} of the frames"
-        text = f"the masks {changes}{pieces}: parts of the person seem to be missing"
-        refused = usable < MOST * len(whole) or broken > MOST
-    elif outside > UNEXPLAINED_SHARE:
-        text = (
-            f"{moves} near the person lies outside the masks, which may miss parts of "
-            "the person"
+        if signs.broken > MOST:
+            pieces = f" and are in pieces in {signs.broken:.0%} of the frames"
+        return poor(
+            f"the masks {changes}{pieces}: parts of the person seem to be missing",
+            usable < MOST * len(whole) or signs.broken > MOST,
         )
-        refused = False
-    else:
-        return None
-    return Verdict(f"{text}{instead}", refused)
+    if signs.is_unexplained:
+        return poor(
+            f"{moves} near the person lies outside the masks, which may miss parts of "
+            "the person",
+            False,
+        )
+    return None
+
+
+class _Signs(NamedTuple):
+    """What counts against the masks of a video. All are shares."""
+
+    outside: float  # of the moving pixels, outside the masks; the median over frames
+    side_change: float  # see `_change`
+    area_change: float
+    ghosts: float  # of the frames, with a mask that shows an empty place
+    broken: float  # of the frames, with a mask in pieces
+
+    @classmethod
+    def of(cls, rows: Sequence[Mapping[str, Any]]) -> Self:
+        """Return the signs of the rows of `FrameQuality` of whole people."""
+        pairs = [(a, b) for a, b in pairwise(rows) if b["frame"] == a["frame"] + 1]
+        return cls(
+            outside=float(np.median([row["beside"] for row in rows])),
+            side_change=_change(pairs, "longer_side"),
+            area_change=_change(pairs, "area"),
+            ghosts=float(np.mean([row["ghost"] for row in rows])),
+            broken=float(np.mean([row["pieces"] > 1 for row in rows])),
+        )
+
+    @property
+    def is_unexplained(self) -> bool:
+        """Whether much moves outside the masks."""
+        return self.outside > UNEXPLAINED_SHARE
+
+    @property
+    def is_unsteady(self) -> bool:
+        """Whether the size of the masks jumps."""
+        return self.side_change > UNSTEADY_SIDE or self.area_change > UNSTEADY_AREA
 
 
 def at_edge(cut: int, count: int) -> str:

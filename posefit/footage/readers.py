@@ -196,7 +196,7 @@ def view_of(
         usable=usable,
         size=size,
         fps=fps,
-        counted="first" in arrays,
+        states_numbers="first" in arrays,
         landmarks=_stated_landmarks(name, arrays, start, stop),
         guesses=guesses,
     )

@@ -82,17 +82,17 @@ class Scanner:
         """
         video = self.video
         size = video.size
-        room = self.stop - self.start
+        count = self.stop - self.start
         people = People(video.fps)
         camera = CameraMotion(size)
         rows = _Rows(self)
         facings = list[float]()
         landmarks = list[Array]()
-        bits = empty_planes(room, size)
-        known = empty_planes(room, size)
+        bits = empty_planes(count, size)
+        known = empty_planes(count, size)
         # a second core segments the next frames while people are told apart in this one
         frames = ahead(self._segmented(changed, watch))
-        for k, frame in enumerate(progress(frames, room) if progress else frames):
+        for k, frame in enumerate(progress(frames, count) if progress else frames):
             image, (blobs, facing, points) = frame
             camera.add(k, image)
             facings.append(facing)
@@ -103,14 +103,14 @@ class Scanner:
             release(known, k)
             present = people.add([blob.mask for blob in blobs if blob.area], image)
             rows.add(k, image, blobs, people, present)
-        count = len(rows.blanks)  # the file may break off
-        numbers = np.arange(self.start, self.start + count)
+        read = len(rows.blanks)  # the file may end early
+        numbers = np.arange(self.start, self.start + read)
         view = View(
             name=str(video.path),
             numbers=numbers,
             times=times_of(numbers, video.fps),
-            bits=bits[:count],
-            known=known[:count],
+            bits=bits[:read],
+            known=known[:read],
             usable=np.array([row["usable"] for row in rows.largest], dtype=bool),
             size=size,
             fps=video.fps,

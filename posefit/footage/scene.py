@@ -178,7 +178,7 @@ def observed_views(scene: Scene) -> list[View]:
             usable=usable,
             size=(camera.width, camera.height),
             fps=scene.fps,
-            counted=True,
+            states_numbers=True,
             warnings=scene.warnings,
             guesses=scene.guesses,
         )

@@ -1,4 +1,12 @@
-"""Segment one person in a video."""
+"""Segment one person in a video.
+
+| value | what it does |
+|---|---|
+| `Extraction` | says how a person is segmented: the user's options |
+| `PersonSegmenter` | finds the people in one frame |
+| `Scanner` | goes once through a video, and tells its people apart: a `Scan` |
+| `Segmentation` | follows one of these people: a `Segmented` view |
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -9,7 +17,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import NoPersonError
-from posefit.footage.cut import CutWatch
+from posefit.footage.edge import EdgeWatch
 from posefit.footage.extraction import Extraction
 from posefit.footage.facing import facings_on_the_spot
 from posefit.footage.identities import with_identities
@@ -91,7 +99,7 @@ class Segmentation:
             NoPersonError: No frame shows a person, or the picture cuts the person in
                 all frames and `refuse_cut` is given.
         """
-        watch = CutWatch(self._scanner).add if refuse_cut else None
+        watch = EdgeWatch(self._scanner).add if refuse_cut else None
         scan = self._scanner.scan(progress, watch=watch)
         if self._all_people is not None:
             scan = with_identities(self._all_people, self._scanner, scan, progress)

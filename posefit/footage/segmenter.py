@@ -41,7 +41,7 @@ class PartOfVideo:
         self, start: int = 0, stop: int | None = None, step: int = 1
     ) -> Iterator[Image]:
         """Yield every `step`th frame from start to stop."""
-        return map(self.cut, self.video.frames(start, stop, step))
+        return map(self.crop, self.video.frames(start, stop, step))
 
     def picture(self, path: str) -> Image:
         """Return a picture of the video's size, scaled and cut as the video.
@@ -62,9 +62,9 @@ class PartOfVideo:
                 f"{path}: background must have the video's size {width}x{height}, "
                 f"got {wide}x{tall}"
             )
-        return self.cut(scaled(image, self.video.size))
+        return self.crop(scaled(image, self.video.size))
 
-    def cut(self, image: NDArray[T]) -> NDArray[T]:
+    def crop(self, image: NDArray[T]) -> NDArray[T]:
         """Return the segmenter's part of an image (height, width, ...)."""
         x, y, wide, tall = self.part
         return np.ascontiguousarray(image[y : y + tall, x : x + wide])
@@ -112,7 +112,7 @@ class PersonSegmenter:
         x, y, wide, tall = self._film.part
         result = image.copy()
         part = result[y : y + tall, x : x + wide]
-        covered = self._film.cut(mask)
+        covered = self._film.crop(mask)
         part[covered] = getattr(self._segmenter, "background", part)[covered]
         return result
 
@@ -127,9 +127,11 @@ class PersonSegmenter:
     ) -> dict[str, Any]:
         """Return the row of quality.csv for a person in the next frame."""
         part = replace(
-            person, mask=self._film.cut(person.mask), valid=self._film.cut(person.valid)
+            person,
+            mask=self._film.crop(person.mask),
+            valid=self._film.crop(person.valid),
         )
-        return quality.row(self._film.cut(image), part, number)
+        return quality.row(self._film.crop(image), part, number)
 
     def _segmented(self, image: Image) -> tuple[Mask, Mask]:
         """Return the segmenter's two masks of its part, pasted into the whole frame."""
@@ -137,7 +139,7 @@ class PersonSegmenter:
         with plugin_errors(f"segmenter {self._how.name!r}", "segment"):
             planes = [
                 np.asarray(plane)
-                for plane in self._segmenter.segment(self._film.cut(image))
+                for plane in self._segmenter.segment(self._film.crop(image))
             ]
         if len(planes) != 2 or any(
             plane.shape != (tall, wide) or plane.dtype != np.bool_ for plane in planes

@@ -9,7 +9,6 @@ scene = scene_of(["a.mp4", "b.mp4"], SourceOptions(camera="cameras.toml"))
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import Any, NamedTuple, Self, cast
 
 from posefit.errors import InputError, NoPersonError
@@ -19,16 +18,15 @@ from posefit.footage.cleaning import cleaned
 from posefit.footage.extraction import Extraction
 from posefit.footage.kinds import Resolved, resolve
 from posefit.footage.options import SourceOptions
-from posefit.footage.pairing import calibrated, listed
+from posefit.footage.pairing import calibrated, read_cameras
 from posefit.footage.scene import Scene, synthetic
 from posefit.footage.segmentation import Segmentation
 from posefit.footage.video import Video
-from posefit.footage.views import Range, View, beyond, together
+from posefit.footage.views import Range, View, range_warning, with_common_frames
 from posefit.footage.world import world_of
 from posefit.geometry.body import Body
 from posefit.geometry.calibration import Calibration
 from posefit.geometry.camera import Camera
-from posefit.geometry.units import Unit
 from posefit.motion import built_in
 from posefit.motion.asf import Acclaim, parse_asf
 from posefit.motion.clips import FPS, FileOptions, Source, load_motion
@@ -63,9 +61,10 @@ def scene_of(
         scene = _of_motion(source, options)
     else:
         scene = _of_footage(source, options, progress)
-    if warning := beyond(options.frames, scene.first, scene.count):
+    if warning := range_warning(options.frames, scene.first, scene.count):
         scene = replace(scene, warnings=[*scene.warnings, warning])
-    return logged(scene, progress)
+    log_guesses(scene, progress)
+    return scene
 
 
 def _of_motion(source: Resolved, options: SourceOptions) -> Scene:
@@ -76,8 +75,8 @@ def _of_motion(source: Resolved, options: SourceOptions) -> Scene:
     of_file = FileOptions(options.asf, rate=options.rate)
     if not cameras:
         of_file = of_file._replace(unit=options.unit, up=options.up)
-    (place,) = source.places
-    motion = load_motion(cast(Source, place), options.fps or FPS, of_file)
+    (material,) = source.materials
+    motion = load_motion(cast(Source, material), options.fps or FPS, of_file)
     return synthetic(motion, options.degrees, size, cameras, options.frames, guesses)
 
 
@@ -92,17 +91,17 @@ def _of_footage(source: Resolved, options: SourceOptions, progress: Progress) ->
     how = _segmented_person(options)
     films = films_of(source, how.width, options.fps)
     filmed: Sequence[tuple[int, int] | None] = [film.filmed for film in films]
-    filmed = filmed or [None] * len(source.places)
-    known = calibrated(options.cameras, filmed, source.names)
+    filmed = filmed or [None] * len(source.materials)
+    given = calibrated(options.cameras, filmed, source.names)
 
     def combine(views: Sequence[View]) -> Scene:
-        return person.seen(views, known, options)
+        return person.seen(views, given, options)
 
     if films:
-        return _of_films(films, known, how, options.frames, progress, combine)
+        return _of_films(films, given, how, options.frames, progress, combine)
     wanted = options.label if options.category is None else options.category
     views = views_of_masks(source, options.frames, wanted, options.fps)
-    return combine(_of_one_person(views, known, options))
+    return combine(_of_one_person(views, given, options))
 
 
 def _segmented_person(options: SourceOptions) -> Extraction:
@@ -125,10 +124,10 @@ def _placed(
 
     `size` is used for calibrations that do not state theirs.
     """
-    known = listed(options.cameras)
-    world, metres, guesses = world_of(known, options.up, options.unit)
+    given = read_cameras(options.cameras)
+    world, metres, guesses = world_of(given, options.up, options.unit)
     cameras = list[Camera]()
-    for each in known:
+    for each in given:
         if isinstance(each, Calibration):
             each = each.in_metres(metres).camera(each.size or size, world)
         # the rasteriser needs square pixels
@@ -136,11 +135,10 @@ def _placed(
     return cameras, [*guesses.values()]
 
 
-def logged(scene: Scene, progress: Progress) -> Scene:
-    """Log the guesses of a scene, and return it."""
+def log_guesses(scene: Scene, progress: Progress) -> None:
+    """Log the guesses of a scene."""
     if scene.guesses:
         progress.log(f"guessed: {'; '.join(scene.guesses)}")
-    return scene
 
 
 def films_of(source: Resolved, width: int, fps: float | None = None) -> list[Video]:
@@ -155,9 +153,9 @@ def films_of(source: Resolved, width: int, fps: float | None = None) -> list[Vid
         InputError: A film cannot be read, or the rates differ.
     """
     films = list[Video]()
-    for kind, place in zip(source.kinds, source.places, strict=True):
+    for kind, material in zip(source.kinds, source.materials, strict=True):
         if kind.film is not None:
-            films.append(kind.film(place, fps, width))
+            films.append(kind.film(material, fps, width))
     # videos that were cut or converted state rates that differ after the third decimal
     rates = sorted({round(film.fps, 3) for film in films})
     if len(rates) > 1:
@@ -185,26 +183,26 @@ def views_of_masks(
         InputError: Masks cannot be read, or cameras have no frame in common.
     """
     views = list[View]()
-    for kind, place in zip(source.kinds, source.places, strict=True):
+    for kind, material in zip(source.kinds, source.materials, strict=True):
         if isinstance(label, str) and not kind.has_categories:
             raise InputError(
                 f"category applies only to annotations ({ANNOTATIONS}), "
                 f"got {quoted(label)}: leave it out"
             )
         if kind.view is not None:
-            views.append(kind.view(place, frames, label, fps))
-    return together(views)
+            views.append(kind.view(material, frames, label, fps))
+    return with_common_frames(views)
 
 
 def _of_one_person(
     views: Sequence[View],
-    known: Sequence[Camera | Calibration],
+    given: Sequence[Camera | Calibration],
     options: SourceOptions,
 ) -> list[View]:
     """Return cleaned views of one person: the one that the first view follows."""
     clean = [cleaned(views[0], options.holes, options.person)]
     for k, view in enumerate(views[1:], 1):
-        choose = partial(same_person, [known[0], known[k]], clean[0], view.size)
+        choose = partial(same_person, [given[0], given[k]], clean[0], view.size)
         clean.append(cleaned(view, options.holes, choose))
     return clean
 
@@ -219,7 +217,7 @@ class _Attempt(NamedTuple):
 
 def _of_films(
     films: Sequence[Video],
-    known: Sequence[Camera | Calibration],
+    given: Sequence[Camera | Calibration],
     how: Extraction,
     frames: Range,
     progress: Progress,
@@ -232,7 +230,7 @@ def _of_films(
         # all are checked before any is read
         parts = [Segmentation(film, way, frames, among) for film in films]
         try:
-            views = _segmented(parts, known, progress)
+            views = _segmented(parts, given, progress)
             doubts = [view.doubt for view in views if view.doubt]
             attempt = _Attempt(way.name, combine(views), doubts[0] if doubts else "")
         except NoPersonError as error:
@@ -254,7 +252,7 @@ def _of_films(
 
 def _segmented(
     parts: list[Segmentation],
-    known: Sequence[Camera | Calibration],
+    given: Sequence[Camera | Calibration],
     progress: Progress,
 ) -> list[View]:
     """Return views of one person: the one that the first film follows.
@@ -270,7 +268,7 @@ def _segmented(
         if views:
             choose = partial(
                 same_person,
-                [known[0], known[k]],
+                [given[0], given[k]],
                 views[0],
                 part.video.size,
                 filmed=part.video.filmed,
@@ -292,45 +290,35 @@ class FilmedBody(NamedTuple):
 
     @classmethod
     def of(cls, options: SourceOptions) -> Self:
-        """Return the person of some options, of which `asf` and `height` are used."""
-        # `unit` describes the calibrations if given, or else the skeleton's file
-        unit = None if options.cameras else options.unit
-        return cls(*body_of(options.asf, options.height, unit))
+        """Return the person of some options, of which `asf` and `height` are used.
+
+        The default is the average skeleton. With a given height there are neither
+        warnings nor guesses, because both are about sizes.
+        """
+        acclaim = Acclaim(built_in.average_skeleton(), 1.0)
+        if options.asf is not None:
+            # `unit` describes the calibrations if given, or else the skeleton's file
+            unit = None if options.cameras else options.unit
+            acclaim = parse_asf(options.asf, unit)
+        body = Body.of(acclaim.skeleton)
+        if options.height is not None:
+            factor = options.height / body.stature
+            return cls(body.scaled(factor, factor), (), ())
+        guesses = []
+        if options.asf is None:
+            guesses.append(f"a person of {body.stature:.2f} m")
+        return cls(body, acclaim.notes, guesses)
 
     def seen(
         self,
         views: Sequence[View],
-        known: Sequence[Camera | Calibration],
+        given: Sequence[Camera | Calibration],
         options: SourceOptions,
     ) -> Scene:
         """Return the scene of this person in the views of cameras, see `combined`."""
-        scene = combined(views, self.body, known, options)
+        scene = combined(views, self.body, given, options)
         return replace(
             scene,
             warnings=[*self.warnings, *scene.warnings],
             guesses=[*scene.guesses, *self.guesses],
         )
-
-
-def body_of(
-    asf: str | Path | None, height: float | None, unit: Unit | None = None
-) -> tuple[Body, Sequence[str], Sequence[str]]:
-    """Return the person's body, with warnings and guesses about it.
-
-    Args:
-        asf: A skeleton file; None for the average skeleton.
-        height: Height in metres that the body is scaled to.
-        unit: Unit of the skeleton file.
-
-    Returns:
-        The body, warnings about the file, and what was guessed. With a given height
-        there are neither warnings nor guesses, because both are about sizes.
-    """
-    average = Acclaim(built_in.average_skeleton(), 1.0)
-    acclaim = average if asf is None else parse_asf(asf, unit)
-    body = Body.of(acclaim.skeleton)
-    if height is not None:
-        factor = height / body.stature
-        return body.scaled(factor, factor), (), ()
-    guesses = [f"a person of {body.stature:.2f} m"] if asf is None else []
-    return body, acclaim.notes, guesses

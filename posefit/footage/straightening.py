@@ -80,7 +80,7 @@ def undistorted(
 
 
 def straightening(
-    known: Camera | Calibration,
+    given: Camera | Calibration,
     size: tuple[int, int],
     filmed: tuple[int, int] | None = None,
     world: Array | None = None,
@@ -91,7 +91,7 @@ def straightening(
     This is the only place that removes distortion and makes pixels square.
 
     Args:
-        known: The camera, or its calibration.
+        given: The camera, or its calibration.
         size: Width and height of the masks.
         filmed: Width and height of the video that they were segmented from.
         world: Rotation (3, 3) that turns the calibration's world so that +y is up.
@@ -105,14 +105,14 @@ def straightening(
         InputError: The masks are not from this camera.
     """
     notes = list[str]()
-    calibration = Calibration.of(known, "") if isinstance(known, Camera) else known
+    calibration = Calibration.of(given, "") if isinstance(given, Camera) else given
     lens = calibration
-    if isinstance(known, Camera) and (known.width, known.height) == size:
-        camera = known
+    if isinstance(given, Camera) and (given.width, given.height) == size:
+        camera = given
     else:
-        lens = fitting(calibration, filmed or size, scaled=filmed is None)
+        lens = calibration_for(calibration, filmed or size, scaled=filmed is None)
         # the world of a `Camera` is upright already
-        if world is None or isinstance(known, Camera):
+        if world is None or isinstance(given, Camera):
             world = np.eye(3)
         camera = lens.in_metres(metres).camera(size, world)
         if calibration.size not in (None, filmed or size):
@@ -140,7 +140,7 @@ def _resized(calibration: Calibration, size: tuple[int, int]) -> str:
     return f"the calibration{name} of {width}x{height} {change}"
 
 
-def fitting(
+def calibration_for(
     calibration: Calibration, size: tuple[int, int], *, scaled: bool
 ) -> Calibration:
     """Return the calibration for pictures of a size.

@@ -42,8 +42,8 @@ class ValueCounts:
     # fractions and alpha channels
     soft: bool = False
     alpha: bool = False  # whether all masks are alpha channels
-    several: int = 0  # masks with more than two values
-    flat: int = 0  # the ones among these with flat areas, like maps of labels
+    many_valued: int = 0  # masks with more than two values
+    flat_masks: int = 0  # the ones among these with flat areas, like maps of labels
     fractions: bool = False  # whether some values are not whole numbers
     lowest: float = np.inf
     highest: float = 0.0
@@ -81,8 +81,8 @@ class ValueCounts:
         self.soft = len(self.pixels) > (2 if self.fractions else COUNTED_VALUES)
         if len(unique) > 1 and not self.soft:
             self.solid.update(_solid(values, unique))
-            self.several += len(unique) > 2
-            self.flat += len(unique) > 2 and flat_share(values) >= MOST
+            self.many_valued += len(unique) > 2
+            self.flat_masks += len(unique) > 2 and flat_share(values) >= MOST
 
     def classifier(
         self, label: int | None, name: object
@@ -103,7 +103,7 @@ class ValueCounts:
             return self._labelled(label, name), []
         values = sorted(self.pixels)
         many = len(values) > MANY_COLOURS
-        if many and not self.soft and 2 * self.flat > self.several:
+        if many and not self.soft and 2 * self.flat_masks > self.many_valued:
             most = [value for value, _ in self.pixels.most_common() if value]
             raise self._several(name, most)
         if self.highest > SCALES[-1] and (self.soft or many):

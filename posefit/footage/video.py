@@ -128,17 +128,22 @@ class Video:
 
     @classmethod
     def of_images(
-        cls, images: Sequence[Image], name: Path, fps: float, width: int | None = None
+        cls,
+        images: Sequence[Image],
+        name: Path,
+        fps: float | None = None,
+        width: int | None = None,
     ) -> "Video":
-        """Return the film of images in memory."""
+        """Return the film of images in memory. The default rate is a guess: 30."""
         filmed = (images[0].shape[1], images[0].shape[0])
         size = _scaled_size(filmed, width)
         return cls(
             name,
-            fps,
+            fps or FPS,
             filmed,
             size,
             pictures=images,
+            guesses=_guessed_rate(fps),
             _order=np.arange(len(images)),
             _is_filmed=np.ones(len(images), dtype=bool),
             # they are in memory already
@@ -157,7 +162,6 @@ class Video:
         """
         assert images.numbered is not None
         files = [file for file in images.numbered.files if file is not None]
-        guesses = list(images.numbered.guesses)
         pictures = list[tuple[Path, int] | Image]()
         for file in files:
             pictures += [(file, page) for page in range(page_count(file))]
@@ -169,8 +173,6 @@ class Video:
             is_filmed = np.array([file is not None for file in images.numbered.files])
             # a film that begins with missing pictures repeats the first one
             order = np.maximum(np.cumsum(is_filmed) - 1, 0)
-        if fps is None:
-            guesses.append(f"{FPS:g} frames a second")
         filmed = (first.shape[1], first.shape[0])
         size = _scaled_size(filmed, width)
         fits = len(pictures) * _bytes_of(size) <= ROOM
@@ -180,7 +182,7 @@ class Video:
             filmed,
             size,
             pictures=pictures,
-            guesses=guesses,
+            guesses=[*images.numbered.guesses, *_guessed_rate(fps)],
             _order=order,
             _is_filmed=is_filmed,
             _kept=KeptFrames(size, range(len(pictures)) if fits else ()),
@@ -261,6 +263,11 @@ class Video:
     def is_filmed(self, k: int) -> bool:
         """Return whether frame k was filmed at its time, and is not a repetition."""
         return bool(self._is_filmed[k])
+
+
+def _guessed_rate(fps: float | None) -> list[str]:
+    """Return the guess of the rate of pictures, if the user does not state one."""
+    return [f"{FPS:g} frames a second"] if fps is None else []
 
 
 def _picture(source: tuple[Path, int] | Image) -> Image:

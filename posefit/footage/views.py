@@ -58,7 +58,7 @@ class View:
     size: tuple[int, int]  # width and height
     fps: float | None = None  # None if the source does not state it
     # whether the source states its frame numbers; if not, they are counted from 0
-    counted: bool = False
+    states_numbers: bool = False
     # width and height of the film, if the masks were segmented from one
     filmed: tuple[int, int] | None = None
     # (T, 27, 3) as `Segmenter.landmarks`; None if the segmenter reports none
@@ -124,10 +124,10 @@ class View:
         return shows
 
 
-def joined(views: Sequence[View]) -> View:
+def concatenated(views: Sequence[View]) -> View:
     """Return one view of all frames of several views, in order, without pictures.
 
-    What some of the views do not know is None in the joined one, except for `known`.
+    What some of the views do not know is None in the result, except for `known`.
     """
     if any(view.known is not None for view in views):
         views = [_with_known(view) for view in views]
@@ -147,7 +147,7 @@ def _with_known(view: View) -> View:
     return replace(view, known=full_planes(len(view), view.size))
 
 
-def together(views: Sequence[View]) -> list[View]:
+def with_common_frames(views: Sequence[View]) -> list[View]:
     """Cut the views of several cameras to the frames that all of them have.
 
     Frames are compared by their numbers, if all cameras state them.
@@ -159,7 +159,7 @@ def together(views: Sequence[View]) -> list[View]:
     starts = [int(view.numbers[0]) for view in views]
     stops = [int(view.numbers[-1]) + 1 for view in views]
     names = [view.name for view in views]
-    if not all(view.counted for view in views):
+    if not all(view.states_numbers for view in views):
         if len(set(starts)) > 1:
             each = zip(starts, names, strict=True)
             came = " and ".join(f"{first} of {name}" for first, name in each)
@@ -283,7 +283,7 @@ def known_planes(there: NDArray[np.bool_], size: tuple[int, int]) -> Planes | No
     return known
 
 
-def beyond(frames: Range, first: int, count: int) -> str:
+def range_warning(frames: Range, first: int, count: int) -> str:
     """Return a message if a range names frames that a source does not have, else "".
 
     Args:

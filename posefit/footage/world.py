@@ -26,12 +26,12 @@ LEAST_HEIGHT = 1e-9
 
 
 def world_of(
-    known: Sequence[Camera | Calibration], up: Up | None, unit: Unit | None
+    given: Sequence[Camera | Calibration], up: Up | None, unit: Unit | None
 ) -> tuple[Array, float, dict[str, str]]:
     """Return the axes and the unit of the cameras' world.
 
     Args:
-        known: The cameras. A `Camera` is upright and in metres already.
+        given: The cameras. A `Camera` is upright and in metres already.
         up: Which axis of the calibrations points up; None to guess it.
         unit: The calibrations' unit; None to guess it from their distances.
 
@@ -42,7 +42,7 @@ def world_of(
     Raises:
         InputError: A unit is given for a file that states another one.
     """
-    calibrations = [camera for camera in known if isinstance(camera, Calibration)]
+    calibrations = [camera for camera in given if isinstance(camera, Calibration)]
     guesses = dict[str, str]()
     if up is None and (guess := guessed_up(calibrations)):
         guesses["up"] = guess
@@ -105,7 +105,7 @@ def has_guessed_unit(camera: Camera | Calibration) -> bool:
     return isinstance(camera, Calibration) and camera.scale != "metres"
 
 
-class _Fitted(NamedTuple):
+class _FittingUnit(NamedTuple):
     """The unit of calibrations that fits the person's height."""
 
     factor: float  # on the lengths of the calibrations
@@ -120,42 +120,42 @@ Measured = Callable[[float], tuple[float, Array]]
 
 def unit_by_height(
     measured: Measured,
-    known: Sequence[Camera | Calibration],
+    given: Sequence[Camera | Calibration],
     metres: float,
     stature: float,
-) -> _Fitted:
+) -> _FittingUnit:
     """Return the unit in which the person's height is about right.
 
     Args:
         measured: Measures the person, given the factor on the lengths of calibrations
             whose unit is a guess.
-        known: The cameras. A calibration may state that it is in metres, or that its
+        given: The cameras. A calibration may state that it is in metres, or that its
             unit may be any length if no usual one fits.
         metres: The unit guessed before, in metres.
         stature: The person's height in metres.
     """
-    if not any(has_guessed_unit(camera) for camera in known):
-        return _Fitted(1.0, "")
+    if not any(has_guessed_unit(camera) for camera in given):
+        return _FittingUnit(1.0, "")
     _, tall = measured(1.0)
     height = float(np.median(tall))
-    all_guessed = all(has_guessed_unit(camera) for camera in known)
+    all_guessed = all(has_guessed_unit(camera) for camera in given)
     if not all_guessed:
         unit = _unit_beside_known(measured, metres, stature)
     elif height > 0.0:
         unit = unit_of_heights(height / metres / stature)
     else:
         # a person behind the cameras says nothing about the unit
-        return _Fitted(1.0, "")
+        return _FittingUnit(1.0, "")
     factor = METRES[unit] / metres
-    is_free = any(getattr(camera, "scale", None) == "free" for camera in known)
+    is_free = any(getattr(camera, "scale", None) == "free" for camera in given)
     if is_free and all_guessed and disagreement(*measured(factor), stature):
         factor = stature / height
         length = f"{factor * metres:.4g} m"
         guess = f"the calibration's unit is {length}, by the person's height"
-        return _Fitted(factor, guess)
+        return _FittingUnit(factor, guess)
     if METRES[unit] == metres:
-        return _Fitted(factor, "")
-    return _Fitted(factor, f"the calibration is in {UNIT_NAMES[unit]}")
+        return _FittingUnit(factor, "")
+    return _FittingUnit(factor, f"the calibration is in {UNIT_NAMES[unit]}")
 
 
 def _unit_beside_known(measured: Measured, metres: float, stature: float) -> Unit:

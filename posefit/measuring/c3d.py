@@ -29,7 +29,7 @@ _ICONS = {"Foot Strike": 1, "Foot Off": 2}
 def write_c3d(
     path: str | Path,
     motion: Motion,
-    blank: Collection[int] = (),
+    unseen: Collection[int] = (),
     gait: Gait | None = None,
 ) -> None:
     """Write the 27 joints of every frame as points, y up, under the names of `PLACES`.
@@ -37,13 +37,13 @@ def write_c3d(
     Args:
         path: The file.
         motion: The motion.
-        blank: Numbers of frames in which all points are unobserved.
+        unseen: Numbers of frames in which all points are unobserved.
         gait: Its strikes and toe-offs become the file's events, the first 255 of them.
     """
     joints = motion.joints * MILLIMETRES
     residuals = np.zeros((*joints.shape[:2], 1))
     points = np.concatenate([joints, residuals], axis=2).astype("<f4")  # (T, 27, 4)
-    points[[number - motion.first for number in blank]] = (0.0, 0.0, 0.0, -1.0)
+    points[[number - motion.first for number in unseen]] = (0.0, 0.0, 0.0, -1.0)
     parameters = b""
     start = 0
     # repeated, because the parameters state the block after them, and so their own size
@@ -116,7 +116,8 @@ def _parameters(
 
 def _in_words(number: int) -> list[int]:
     """Return a number of 32 bits as two numbers of 16, the lower half first."""
-    return [number & MAX_FRAMES, number >> 16]
+    upper, lower = divmod(number, 1 << 16)
+    return [lower, upper]
 
 
 def _events(gait: Gait) -> Iterator[tuple[float, str, str]]:

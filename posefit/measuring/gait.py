@@ -136,12 +136,12 @@ class Gait:
         return {"walk": not self.why, **asdict(self), **counted, **reasons}
 
 
-def gait_of(motion: Motion, unknown: Collection[int] = ()) -> Gait:
+def gait_of(motion: Motion, unseen: Collection[int] = ()) -> Gait:
     """Return the gait of a motion.
 
     Args:
         motion: The motion.
-        unknown: Numbers of frames to ignore, such as held or lost ones.
+        unseen: Numbers of frames to ignore, such as held or lost ones.
 
     Returns:
         The gait, with `why` if it has no figures.
@@ -159,9 +159,9 @@ def gait_of(motion: Motion, unknown: Collection[int] = ()) -> Gait:
     distance = (moved * events.heading[1:]).sum()
     speed = float(distance / max(len(motion) - 1, 1) * motion.fps)
     in_place = abs(speed) < MIN_SPEED
-    frames = {number - motion.first for number in unknown}
-    steps = list(_steps(events, motion.fps, motion.first, frames, in_place))
-    known = (len(motion) - len(unknown)) / motion.fps
+    unknown = {number - motion.first for number in unseen}
+    steps = list(_steps(events, motion.fps, motion.first, unknown, in_place))
+    known = (len(motion) - len(unseen)) / motion.fps
     if why := _why_not(motion, events, steps, speed, known):
         return Gait(steps=steps, why=why)
     left = _of_foot([step for step in steps if step.foot == "left"])
@@ -206,7 +206,8 @@ def _steps(
 ) -> Iterator[Step]:
     """Yield every strike in order of time, with its step and stride if they are known.
 
-    With `in_place` they have no lengths.
+    `first` is the number of the first frame, from which `unknown` frames are counted.
+    With `in_place` steps and strides have no lengths.
     """
     least = -np.inf if in_place else MIN_SPEED
     strikes = []
@@ -216,16 +217,10 @@ def _steps(
     for k, (time, foot) in enumerate(strikes):
         other = "right" if foot == "left" else "left"
         measures: dict[str, float | None] = {}
-        again = np.inf  # this foot's next strike
-        for later, side in strikes[k + 1 :]:
-            if side == foot:
-                again = later
-                break
-        off = None  # this foot's first lift-off in between
-        for lift in _known(events.offs[foot], unknown):
-            if time < lift < again:
-                off = lift
-                break
+        next_strikes = (later for later, side in strikes[k + 1 :] if side == foot)
+        again = next(next_strikes, np.inf)  # this foot strikes again
+        lifts = _known(events.offs[foot], unknown)
+        off = next((lift for lift in lifts if time < lift < again), None)
         if off is not None:
             measures["toe_off_seconds"] = (first + off) / fps
         before, foot_before = strikes[k - 1] if k else (time, foot)
@@ -408,7 +403,7 @@ def stride_curves(motion: Motion, gait: Gait, angle: str) -> dict[str, Array]:
     return curves
 
 
-def walks_backwards(motion: Motion, unknown: Collection[int] = ()) -> NDArray[np.bool_]:
+def walks_backwards(motion: Motion, unseen: Collection[int] = ()) -> NDArray[np.bool_]:
     """Return the frames (T,) in which the root faces away from the direction of travel.
 
     That direction is measured over the half second around a frame, on the ground, if
@@ -418,7 +413,7 @@ def walks_backwards(motion: Motion, unknown: Collection[int] = ()) -> NDArray[np
 
     Args:
         motion: The motion.
-        unknown: Numbers of frames to ignore.
+        unseen: Numbers of frames to ignore.
     """
     count = len(motion)
     half = max(round(0.5 * TRAVEL_SECONDS * motion.fps), 1)
@@ -430,7 +425,7 @@ def walks_backwards(motion: Motion, unknown: Collection[int] = ()) -> NDArray[np
     way = ground[2 * half :] - ground[: -2 * half]
     headings = np.column_stack([np.sin(yaws), np.cos(yaws)])  # (T - 2 half, 2)
     away = np.asarray((way * headings).sum(axis=1) < 0.0)
-    frame_known = np.isin(motion.first + np.arange(count), [*unknown], invert=True)
+    frame_known = np.isin(motion.first + np.arange(count), [*unseen], invert=True)
     known = np.asarray(sliding_window_view(frame_known, 2 * half + 1).all(axis=1))
     fast = np.linalg.norm(way, axis=1) > MIN_TRAVEL_SPEED * 2 * half / motion.fps
     back[half : count - half] = away & fast & known

@@ -32,22 +32,26 @@ def import_pandas() -> Any:
         ) from error
 
 
-def angle_columns(motion: Motion, blank: Collection[int] = ()) -> dict[str, Array]:
+def angle_columns(motion: Motion, unseen: Collection[int] = ()) -> dict[str, Array]:
     """Return the clinical angles (T,) in degrees, by name.
 
-    They are NaN in the frames with the numbers in `blank`.
+    They are NaN in the frames with the numbers in `unseen`.
     """
-    unknown = np.isin(motion.first + np.arange(len(motion)), list(blank))
+    is_unseen = np.isin(motion.first + np.arange(len(motion)), list(unseen))
     angles = clinical_angles(motion.skeleton, motion.poses)
-    return {name: np.where(unknown, np.nan, values) for name, values in angles.items()}
+    return {
+        name: np.where(is_unseen, np.nan, values) for name, values in angles.items()
+    }
 
 
-def write_angles(path: str | Path, motion: Motion, blank: Collection[int] = ()) -> None:
+def write_angles(
+    path: str | Path, motion: Motion, unseen: Collection[int] = ()
+) -> None:
     """Write the clinical angles in degrees as a .csv file, one row per frame.
 
-    Frames with the numbers in `blank` have only the time.
+    Frames with the numbers in `unseen` have only the time.
     """
-    angles = angle_columns(motion, blank)
+    angles = angle_columns(motion, unseen)
     with Path(path).open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["frame", "seconds", *angles])
@@ -77,22 +81,22 @@ def write_gait(path: str | Path, gait: Gait) -> None:
             writer.writerow(cells)
 
 
-def write_trc(path: str | Path, motion: Motion, blank: Collection[int] = ()) -> None:
+def write_trc(path: str | Path, motion: Motion, unseen: Collection[int] = ()) -> None:
     """Write the 27 joints of every frame as markers in a .trc file, in metres, y up.
 
-    Markers have the names of `PLACES`. Frames with the numbers in `blank` have no row,
+    Markers have the names of `PLACES`. Frames with the numbers in `unseen` have no row,
     because OpenSim's inverse kinematics stops at a row without markers; it takes the
-    others by their times. It needs at least one row: if every frame is blank, each has
+    others by their times. It needs at least one row: if every frame is unseen, each has
     a row of empty cells.
     """
     path = Path(path)
     count = len(motion)
     numbers = motion.first + np.arange(count)
-    unknown = np.isin(numbers, list(blank))
-    if unknown.all():
+    is_unseen = np.isin(numbers, list(unseen))
+    if is_unseen.all():
         rows = np.arange(count)
     else:
-        rows = np.flatnonzero(~unknown)
+        rows = np.flatnonzero(~is_unseen)
     fps = f"{motion.fps:.10g}"
     head = {
         "DataRate": fps,
@@ -116,7 +120,7 @@ def write_trc(path: str | Path, motion: Motion, blank: Collection[int] = ()) -> 
     points = motion.joints.reshape(count, -1)
     for k in rows:
         cells = [f"{value:.6f}" for value in points[k]]
-        if unknown[k]:
+        if is_unseen[k]:
             # one cell more, because OpenSim does not count an empty last cell
             cells = [""] * (len(cells) + 1)
         time = f"{numbers[k] / motion.fps:.6f}"

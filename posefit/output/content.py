@@ -27,24 +27,26 @@ from posefit.version import __version__
 class Setup:
     """The arguments and the circumstances of a track."""
 
-    motion: str
+    motion: str  # the name of the scene
     source: list[str] | None = None  # one per camera
-    frames_chosen: list[int | None] | None = None
+    frames_chosen: list[int | None] | None = (
+        None  # start and stop, as the user gave them
+    )
     view_degrees: Any = None
     method: str
     settings: Mapping[str, Mapping[str, Any]]
     seed: int
     train: list[str]
     evaluations_per_frame: int
-    dimensions: int | None
+    dimensions: int | None  # coordinates of a proposal; None for a tracker of a plugin
     translation: str
     first_pose: str
     smooth: bool
-    views: int
-    camera: str
-    size_pixels: tuple[int, int]
+    views: int  # number of cameras
+    camera: str  # where the cameras come from, see `Scene.placing`
+    size_pixels: tuple[int, int]  # of the first camera
     fps: float
-    frames: int
+    frames: int  # number of frames
     version: str = __version__
 
 
@@ -52,16 +54,17 @@ class Setup:
 class TrackingLog:
     """The course of a track, and everything that it did not determine."""
 
-    hypotheses: list[dict[str, Any]]
-    build: Mapping[str, Any] | None
-    trace: list[list[float]] | None
-    modes: list[float] | None
-    none_of_modes: float | None
+    hypotheses: list[dict[str, Any]]  # see `Tracked`
+    build: Mapping[str, Any] | None  # None if the build was not fitted
+    trace: list[list[float]] | None  # evaluations and best costs of a single frame
+    modes: list[float] | None  # the weights of other likely tracks
+    none_of_modes: float | None  # the mean probability that no mode is right
+    # numbers of frames, as filmed; None if the method does not report them
     unknown_sides: list[int] | None
     lost_frames: list[int] | None
-    relocalised: list[int]
-    retracked_outside: tuple[int, int] | None
-    backwards_share: float
+    relocalised: list[int]  # numbers of frames, as filmed
+    retracked_outside: tuple[int, int] | None  # the run without spins that was kept
+    backwards_share: float  # of the frames
     warnings: list[str]
     guesses: list[str]
 
@@ -102,7 +105,7 @@ class Content:
         return self.scene.motion(self.frames)
 
     @cached_property
-    def blank(self) -> set[int]:
+    def unseen(self) -> set[int]:
         """The numbers, as filmed, of the frames that show nothing of the person."""
         return unseen(self.table)
 
@@ -113,7 +116,7 @@ class Content:
         Unknown joints are NaN.
         """
         points = self.motion.joints.reshape(len(self.frames), -1).T.copy()  # (81, T)
-        points[:, np.isin(self.table["frame"], list(self.blank))] = np.nan
+        points[:, np.isin(self.table["frame"], list(self.unseen))] = np.nan
         names = [f"{place}_{axis}" for place in PLACES for axis in "xyz"]
         columns: dict[str, Any] = dict(self.table)
         columns["activity"] = [frame.activity for frame in self.frames]

@@ -42,7 +42,7 @@ def _write_npz(path: Path, content: Content) -> None:
     )
 
 
-def _write_table(path: Path, content: Content) -> None:
+def _write_frames(path: Path, content: Content) -> None:
     columns = content.columns
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
@@ -92,19 +92,19 @@ WRITERS: Mapping[str, Format] = {
         lambda path, track: write_glb(path, track.motion, track.scene.body.radii),
     ),
     "trc": Format(
-        "track.trc", lambda path, track: write_trc(path, track.motion, track.blank)
+        "track.trc", lambda path, track: write_trc(path, track.motion, track.unseen)
     ),
     "c3d": Format(
         "track.c3d",
-        lambda path, track: write_c3d(path, track.motion, track.blank, track.gait),
+        lambda path, track: write_c3d(path, track.motion, track.unseen, track.gait),
     ),
     "mot": Format("track.mot", lambda path, track: write_mot(path, track.motion)),
     "osim": Format(
         "model.osim", lambda path, track: write_osim(path, track.scene.body, PLACES)
     ),
-    "frames": Format("frames.csv", _write_table),
+    "frames": Format("frames.csv", _write_frames),
     "angles": Format(
-        "angles.csv", lambda path, track: write_angles(path, track.motion, track.blank)
+        "angles.csv", lambda path, track: write_angles(path, track.motion, track.unseen)
     ),
     "gait": Format("gait.csv", lambda path, track: write_gait(path, track.gait)),
     "camera": Format(

@@ -68,7 +68,7 @@ class Recorder:
 class OutputFolder(Recorder):
     """Writes to a hidden folder next to the target, and renames it at the end.
 
-    `spec` has the arguments that a track must share with the track that it resumes.
+    `identity` has the arguments that a track must share with the track that it resumes.
     `kinds` are the kinds of files, as `chosen_kinds` returns them. Raises InputError if
     the target may not be written.
     """
@@ -78,26 +78,26 @@ class OutputFolder(Recorder):
         path: str | Path,
         force: bool,
         resume: bool,
-        spec: Mapping[str, Digest],
+        identity: Mapping[str, Digest],
         log: Callable[[str], None],
         kinds: Sequence[str] = tuple(WRITERS),
     ) -> None:
         self.path = Path(path)
-        self._spec = dict(spec)
+        self._identity = dict(identity)
         self._log = log
         self._kinds = kinds
         self._recorded = 0
         self._slot = 0  # the index of the carried file that is written next
         self._force = force
         _check_target(self.path, force)
-        self._unfinished = _interrupted(self.path, self._spec) if resume else None
+        self._unfinished = _interrupted(self.path, self._identity) if resume else None
 
     def __enter__(self) -> Self:
         try:
             if self._unfinished is None:
                 for earlier in Unfinished.interrupted(self.path):
                     earlier.remove(_WRITTEN)
-                self._unfinished = Unfinished.begin(self.path, self._spec)
+                self._unfinished = Unfinished.begin(self.path, self._identity)
             self.building = self._unfinished.path
             # read now, to keep them if something fails before the first new frame
             frames, state, damage = read_frames(self.building / RECORD)
@@ -124,30 +124,9 @@ class OutputFolder(Recorder):
     ) -> None:
         assert self._unfinished is not None
         if kind is None:
-            try:
-                self._unfinished.finish(_WRITTEN, self._force)
-            except OSError as failure:
-                self._unfinished.close()
-                raise InputError(
-                    f"{self.path}: cannot put the results there: {failure.strerror}; "
-                    f"they are in {self.building}"
-                ) from None
-            # only a resumed track needs the record
-            for name in (RECORD, *CARRIED_FILES):
-                (self.path / name).unlink(missing_ok=True)
+            self._publish(self._unfinished)
             return
-        # keep the record to resume from, but no results, which may be half written
-        notice = ""
-        if self._recorded:
-            for name in FILES:
-                (self.building / name).unlink(missing_ok=True)
-            notice = (
-                f"; {self._recorded} finished frames are kept: "
-                "the same command with --resume continues from there"
-            )
-            self._unfinished.close()
-        else:
-            self._unfinished.remove(_WRITTEN)
+        notice = self._keep_record(self._unfinished)
         # the notice goes into the error's own message, if the user will see that
         if isinstance(error, OSError) and self._is_about_folder(error):
             cause = f"{error.strerror or error}{notice}"
@@ -156,6 +135,36 @@ class OutputFolder(Recorder):
             raise InputError(f"{error}{notice}") from error
         if notice:
             self._log(notice[2:])
+
+    def _publish(self, unfinished: Unfinished) -> None:
+        """Put the complete folder in its place, without the record."""
+        try:
+            unfinished.finish(_WRITTEN, self._force)
+        except OSError as failure:
+            unfinished.close()
+            raise InputError(
+                f"{self.path}: cannot put the results there: {failure.strerror}; "
+                f"they are in {self.building}"
+            ) from None
+        # only a resumed track needs the record
+        for name in (RECORD, *CARRIED_FILES):
+            (self.path / name).unlink(missing_ok=True)
+
+    def _keep_record(self, unfinished: Unfinished) -> str:
+        """Keep the record to resume from, but no results: they may be half written.
+
+        Returns a notice of the frames that are kept, or "" if there are none.
+        """
+        if not self._recorded:
+            unfinished.remove(_WRITTEN)
+            return ""
+        for name in FILES:
+            (self.building / name).unlink(missing_ok=True)
+        unfinished.close()
+        return (
+            f"; {self._recorded} finished frames are kept: "
+            "the same command with --resume continues from there"
+        )
 
     def _is_about_folder(self, error: OSError) -> bool:
         """Return whether an error is about this folder or the room on its disk.
@@ -213,13 +222,13 @@ def _check_target(path: Path, force: bool) -> None:
         )
 
 
-def _interrupted(path: Path, spec: Mapping[str, Digest]) -> Unfinished:
+def _interrupted(path: Path, identity: Mapping[str, Digest]) -> Unfinished:
     """Return the latest unfinished folder of a track with the same arguments."""
     interrupted = Unfinished.interrupted(path)
     if not interrupted:
         raise InputError(f"{path}: expected an interrupted track to resume, got none")
     try:
-        others = [difference(folder.info, spec) for folder in interrupted]
+        others = [difference(folder.info, identity) for folder in interrupted]
     except (AttributeError, TypeError):
         raise InputError(
             f"{interrupted[0].path / MARK}: expected the arguments of a track, "

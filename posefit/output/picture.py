@@ -57,7 +57,7 @@ SOLID = 0.65  # the opacity of the body over the footage
 MIN_OTHER_WEIGHT = 0.2  # modes with less weight are not drawn
 # the most other modes on the summary of a single frame, and their least weight
 ALTERNATIVES = 3
-MIN_WEIGHT = 0.05
+MIN_ALTERNATIVE_WEIGHT = 0.05
 BORDER = 6  # pixels around a lost frame
 LINE_HEIGHT = 22  # pixels from one line to the next
 # the top of a curve is twice the 0.9 quantile; values above it are peaks
@@ -177,7 +177,7 @@ class Painter:
             share = f", {100.0 * weight:.0f} %"
         lost = _Certainty.of(row, observation).lost
         self._stills.append(self._still(image, row, lost, share))
-        alternatives = [mode for mode in others if mode.weight > MIN_WEIGHT]
+        alternatives = [mode for mode in others if mode.weight > MIN_ALTERNATIVE_WEIGHT]
         for mode in alternatives[:ALTERNATIVES]:
             alternative = replace(frame, pose=mode.pose, translation=mode.translation)
             still = self._panels(alternative, observation, filmed)
@@ -415,22 +415,20 @@ def curve(values: Array, name: str, width: int, height: int, first: int = 0) -> 
     image = blank(height, width)
     left = 66
     right = width - 16
+    bottom = height - 24  # the row of 0
     limit = PEAK * float(np.quantile(values, PEAK_QUANTILE))
-    # one peak per run of frames above the limit, the highest first
-    peaks = []
-    for start, stop in runs(values > limit):
-        peaks.append(start + int(values[start:stop].argmax()))
-    peaks.sort(key=lambda k: -values[k])
+    peaks = _peaks(values, limit)
     top = limit if peaks and limit > 0.0 else float(values.max())
-    scale = (height - 56) / (max(top, 1e-9) * 1.15)
+    # a margin above the top, for peaks and the title
+    scale = (bottom - 32) / (max(top, 1e-9) * 1.15)
     for lines, level in enumerate((0.0, float(np.mean(values)), top)):
-        row = int(height - 24 - level * scale)
+        row = int(bottom - level * scale)
         cv2.line(image, (left, row), (right, row), LINES, 1)
         # labels keep a line's distance, even if their levels are closer
-        text_row = min(row, height - 24 - lines * LINE_HEIGHT) + 6
+        text_row = min(row, bottom - lines * LINE_HEIGHT) + 6
         write(image, f"{level:.2f}", (8, text_row), scale=SUMMARY_SCALE - 0.1)
     x = np.linspace(left, right, max(len(values), 2))[: len(values)]
-    y = height - 24 - scale * np.minimum(values, 1.1 * top)  # (T,)
+    y = bottom - scale * np.minimum(values, 1.1 * top)  # (T,)
     points = np.rint(np.column_stack([x, y]) * 16).astype(np.int32)
     cv2.polylines(image, [points], False, BOTH, 2, cv2.LINE_AA, 4)
     words = "mean and maximum"
@@ -441,3 +439,11 @@ def curve(values: Array, name: str, width: int, height: int, first: int = 0) -> 
             words += f" and {len(peaks) - MAX_PEAKS} more"
     write(image, f"{name}, frame by frame: 0, {words}", (left, 20), scale=SUMMARY_SCALE)
     return image
+
+
+def _peaks(values: Array, limit: float) -> list[int]:
+    """Return the highest frame of each run above a limit, the highest run first."""
+    peaks = []
+    for start, stop in runs(values > limit):
+        peaks.append(start + int(values[start:stop].argmax()))
+    return sorted(peaks, key=lambda k: -values[k])

@@ -20,7 +20,7 @@ from posefit.footage.video import ahead
 from posefit.footage.writing import VideoWriter
 from posefit.output.content import Content
 from posefit.output.page import track_document
-from posefit.output.page.content import track_data
+from posefit.output.page.data import track_data
 from posefit.output.page.stills import Stills
 from posefit.output.picture import Painter
 from posefit.output.text import undetermined

@@ -17,7 +17,7 @@ from posefit.reading import counted
 
 # parts of the build that differ less from the average are not mentioned
 MIN_BUILD_CHANGE = 0.05
-MIN_MODE = 0.08  # poses with less weight do not count as open
+MIN_OPEN_WEIGHT = 0.08  # poses with less weight do not count as open
 WIDTH = 30  # characters of the column of names
 GAIT_ROWS = (  # the measures of a foot: name, label, unit, factor and digits
     ("step_length", "step", "m", 1.0, 2),
@@ -36,7 +36,7 @@ def brief(track: Content) -> list[str]:
     setup = track.setup
     measures = track.measures
     lines = [_quality(measures) if track.trust is None else track.trust.sentence]
-    open_poses = sum(weight >= MIN_MODE for weight in track.log.modes or [])
+    open_poses = sum(weight >= MIN_OPEN_WEIGHT for weight in track.log.modes or [])
     if setup.frames == 1 and open_poses > 1:
         lines.append(f"{open_poses} poses are possible with this one silhouette")
     guessed = ", camera guessed" if setup.camera == "guessed" else ""
@@ -46,7 +46,7 @@ def brief(track: Content) -> list[str]:
     return [printable(line) for line in lines]
 
 
-def table(track: Content) -> str:
+def detailed(track: Content) -> str:
     """Return the lines that `posefit track --verbose` prints."""
     setup = track.setup
     measures = track.measures

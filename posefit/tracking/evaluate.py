@@ -72,11 +72,11 @@ def evaluate(
     if scene.truth is None and (warning := backwards_warning(backwards)):
         warnings.append(warning)
     modes = track_modes(skeleton, posteriors)
-    stay = None
-    if tracked.stay is not None:
+    kept_run = None
+    if tracked.kept_run is not None:
         # counted from the scene's first frame so far, and as filmed in the log
-        first, last = tracked.stay
-        stay = scene.first + first, scene.first + last
+        first, last = tracked.kept_run
+        kept_run = scene.first + first, scene.first + last
     log = TrackingLog(
         hypotheses=tracked.hypotheses,
         build=None if shape is None else shape.as_dict(),
@@ -86,7 +86,7 @@ def evaluate(
         unknown_sides=_numbers(table, "unknown_sides"),
         lost_frames=_numbers(table, "lost"),
         relocalised=_relocalised(scene, frames),
-        retracked_outside=stay,
+        retracked_outside=kept_run,
         backwards_share=round(float(backwards.mean()), 6),
         warnings=warnings,
         guesses=[*scene.guesses],

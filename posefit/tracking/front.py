@@ -15,7 +15,7 @@ from posefit.fitting.check import whole
 from posefit.fitting.driving import clocks
 from posefit.footage.extraction import Extraction
 from posefit.footage.kinds import Resolved, first_of, resolve
-from posefit.footage.named import Footage
+from posefit.footage.named import OneSource
 from posefit.footage.options import SourceOptions
 from posefit.footage.scene import Scene
 from posefit.footage.source import scene_of
@@ -51,7 +51,7 @@ _FILES = ("source", "train", "asf", "camera", "extraction")
 
 
 def track(
-    source: Footage | Scene | Resolved | Sequence[Any] = "walk",
+    source: OneSource | Scene | Resolved | Sequence[Any] = "walk",
     *,
     out: str | Path | None = None,
     force: bool = False,
@@ -98,11 +98,11 @@ def track(
     if scene is not None:
         _check_no_source_options(chosen)
     check_used(resolved.medium, chosen)
-    known = resolved.medium == "motion"
-    _check_for_kind(chosen, known, [*resolved.named, *chosen.train])
+    is_motion = resolved.medium == "motion"
+    _check_for_kind(chosen, is_motion, [*resolved.named, *chosen.train])
     named = resolved.named[0]
     followed = named if isinstance(named, str | Path | Motion) else None
-    chosen = completed(chosen, followed if known else None)
+    chosen = completed(chosen, followed if is_motion else None)
     # before the work, because a name may be wrong
     clips = training_clips(chosen.train, chosen.of_files, followed=followed)
     kinds = chosen_kinds(write)
@@ -135,7 +135,7 @@ def track(
 
 
 def fit(
-    source: Footage | Sequence[Any] = "walk",
+    source: OneSource | Sequence[Any] = "walk",
     *,
     frame: int | None = None,
     **options: Unpack[FitKeywords],
@@ -200,7 +200,7 @@ def _check_names(function: str, options: Iterable[str], known: Sequence[str]) ->
         raise TypeError(f"{function} has no option {unknown[0]!r}{hint}")
 
 
-def _resolved(source: Footage | Scene | Resolved | Sequence[Any]) -> Resolved:
+def _resolved(source: OneSource | Scene | Resolved | Sequence[Any]) -> Resolved:
     """Return the resolved source; for a scene, its motion."""
     if not isinstance(source, Scene):
         return resolve(source)
@@ -213,11 +213,11 @@ def _resolved(source: Footage | Scene | Resolved | Sequence[Any]) -> Resolved:
 
 
 def _check_for_kind(
-    options: TrackOptions, known: bool, motions: Sequence[Footage]
+    options: TrackOptions, is_motion: bool, motions: Sequence[OneSource]
 ) -> None:
     """Raise InputError for an option that does not apply to the source.
 
-    Some options need .amc files, others a `known` truth. `motions` are all motions that
+    Some options need .amc files, others a known motion. `motions` are all motions that
     the track reads.
     """
     captured = any(map(_is_captured, motions))
@@ -227,7 +227,7 @@ def _check_for_kind(
         raise InputError(
             f"rate applies only to .amc files, got {quoted(options.rate)}: leave it out"
         )
-    if not known:
+    if not is_motion:
         if options.translation == "known":
             raise InputError(
                 "translation must be searched or aligned for footage, got known"
@@ -242,7 +242,7 @@ def _check_for_kind(
         )
 
 
-def _is_captured(motion: Footage) -> TypeGuard[str | Path]:
+def _is_captured(motion: OneSource) -> TypeGuard[str | Path]:
     """Return whether a motion is an .amc file, whose skeleton is in another file."""
     return isinstance(motion, str | Path) and str(motion).lower().endswith(".amc")
 

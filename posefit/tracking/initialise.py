@@ -1,6 +1,5 @@
 """Estimates before the first frame: its pose, by restarts, and the person's build."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -10,7 +9,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.driving import clocks
 from posefit.fitting.shape import NAMES, SPREAD, Shape, fit_shape
-from posefit.fitting.tracker import Follow, Frame, Observation, Task, guessed_modes
+from posefit.fitting.tracker import Follow, Frame, Observation, Task
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
@@ -26,11 +25,11 @@ from posefit.tracking.restarts import (
     TRIAL_STRIDE,
     best_restart,
     first_shown_whole,
+    guessed,
     usable_observations,
 )
 from posefit.tracking.smoothing.contours import fit_contours
 from posefit.tracking.smoothing.path import Visibility
-from posefit.uncertainty.modes import Posterior
 
 MIN_BODY_FRAMES = 5
 # Our choice: a walker hardly turns farther in this time than a search reaches, which is
@@ -65,7 +64,7 @@ class Initialised(NamedTuple):
     task: Task  # with the first pose, if it was searched
     shape: Shape | None  # the person's build, or None if it was not fitted
     # (2,) see `posefit.fitting.driving.clocks`, after the rasteriser was compiled
-    start: Array
+    start_clocks: Array
     effort: dict[str, int]  # evaluations of each stage
 
 
@@ -106,45 +105,43 @@ def initialise(
             log=progress.log,
         )
         effort["first_pose"] = sum(frame.evaluations for frame in tried)
-    body_frames = options.body_frames or 0
-    count = len(usable_observations(scene.observations, body_frames))
-    if body_frames and count < MIN_BODY_FRAMES:
-        few = f"{count} are too few"
-        if count < body_frames:
-            few = f"{count} of them show enough of the person"
-        needed = f"at least {MIN_BODY_FRAMES} are needed; the average build is used"
-        progress.log(f"no build is fitted to {body_frames} frames: {few}, {needed}")
-    elif body_frames:
-        progress.log(f"fitting the person's build to {body_frames} frames")
+    if options.body_frames and _has_enough(scene, options.body_frames, progress):
+        progress.log(f"fitting the person's build to {options.body_frames} frames")
         height = options.height
         # the masks of one camera do not tell a tall person from a near one
         if height is None and len(scene.cameras) == 1 and task.translation == "aligned":
             height = task.body.stature
-        drawn = PoseCount()
-        with drawn.counting():
+        rasterised = PoseCount()
+        with rasterised.counting():
             shape, cameras = fitted_build(
                 task,
                 scene,
                 method.follow,
-                body_frames,
+                options.body_frames,
                 height,
                 options.seed,
                 beta=method.audit.beta,
                 restarts=options.restarts or 0,
             )
-        effort["build"] = round(drawn.poses / len(scene.cameras))
+        effort["build"] = round(rasterised.poses / len(scene.cameras))
         task = replace(task, body=shape.body, cameras=cameras)
     return Initialised(task, shape, start, effort)
 
 
-def guessed(
-    task: Task, observation: Observation
-) -> tuple[Sequence[tuple[float, Posterior]], int]:
-    """Return modes of the poses that one picture may show, and their evaluations."""
-    drawn = PoseCount()
-    with drawn.counting():
-        modes = guessed_modes(task, observation)
-    return modes, math.ceil(drawn.poses / len(task.cameras))
+def _has_enough(scene: Scene, body_frames: int, progress: Progress) -> bool:
+    """Return whether a scene has usable frames for a build, and log it if not.
+
+    The build is to be fitted to `body_frames` frames, and needs `MIN_BODY_FRAMES`.
+    """
+    count = len(usable_observations(scene.observations, body_frames))
+    if count >= MIN_BODY_FRAMES:
+        return True
+    few = f"{count} are too few"
+    if count < body_frames:
+        few = f"{count} of them show enough of the person"
+    needed = f"at least {MIN_BODY_FRAMES} are needed; the average build is used"
+    progress.log(f"no build is fitted to {body_frames} frames: {few}, {needed}")
+    return False
 
 
 def fitted_build(

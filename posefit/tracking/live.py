@@ -20,10 +20,10 @@ from posefit.footage.live import Stream, live_views
 from posefit.footage.observations import Observations
 from posefit.footage.pairing import calibrated
 from posefit.footage.scene import Scene
-from posefit.footage.source import FilmedBody, logged
+from posefit.footage.source import FilmedBody, log_guesses
 from posefit.footage.straightening import straightening
 from posefit.footage.uses import check_used
-from posefit.footage.views import View, joined
+from posefit.footage.views import View, concatenated
 from posefit.motion.clips import training_clips, training_motions
 from posefit.options import declared
 from posefit.progress import QUIET, Progress
@@ -123,7 +123,8 @@ def track_live(
         chosen = chosen.changed(fps=stream.rate)
     scene, observed = _scene_of(first, source, chosen)
     training = training_motions(clips, scene.fps)
-    scene = with_notes(logged(scene, progress), training)
+    log_guesses(scene, progress)
+    scene = with_notes(scene, training)
     for warning in scene.warnings:
         progress.warn(warning)
     waiting: deque[View] = deque()
@@ -165,13 +166,15 @@ def _scene_of(
         raise InputError(
             f"{name}: expected a person in the first {len(first)} frames, got none"
         )
-    known = calibrated(options.cameras, [None])
-    view = joined(first)
-    scene = replace(FilmedBody.of(options).seen([view], known, options), name=name)
-    _, how, _ = straightening(known[0], view.size) if known else (None, None, None)
+    given = calibrated(options.cameras, [None])
+    view = concatenated(first)
+    scene = replace(FilmedBody.of(options).seen([view], given, options), name=name)
+    _, correction, _ = (
+        straightening(given[0], view.size) if given else (None, None, None)
+    )
 
     def observed(live: View) -> Observation:
-        straight = live if how is None else how.of(live)
+        straight = live if correction is None else correction.of(live)
         return Observations([straight])[0]  # type: ignore[no-any-return]
 
     return scene, observed
@@ -222,19 +225,7 @@ def write_live(
             (folder / FRAMES_FILE).unlink(missing_ok=True)
             folder.rmdir()
         elif folder is not None:
-            text = (folder / FRAMES_FILE).read_text("utf-8")
-            rows = [json.loads(line) for line in text.splitlines()]
-            poses = np.radians([row["pose_degrees"] for row in rows])
-            translations = np.array([row["translation_m"] for row in rows])
-            # reshaped, because without rows both have a single axis
-            np.savez_compressed(
-                folder / POSES_FILE,
-                frames=np.array([row["frame"] for row in rows], dtype=np.int64),
-                seconds=np.array([row["seconds"] for row in rows]),
-                poses=poses.reshape(-1, 66),
-                translations=translations.reshape(-1, 3),
-                usable=np.array([row["usable"] for row in rows], dtype=bool),
-            )
+            _write_poses(folder)
     median = slow = np.nan
     if latencies:
         median, slow = np.quantile(latencies, (0.5, 0.99)).tolist()
@@ -243,3 +234,20 @@ def write_live(
         "skipped": last + 1 - len(latencies),
         "latency_ms": {"p50": round(1e3 * median, 1), "p99": round(1e3 * slow, 1)},
     }
+
+
+def _write_poses(folder: Path) -> None:
+    """Write poses.npz from the lines of frames.jsonl."""
+    text = (folder / FRAMES_FILE).read_text("utf-8")
+    rows = [json.loads(line) for line in text.splitlines()]
+    poses = np.radians([row["pose_degrees"] for row in rows])
+    translations = np.array([row["translation_m"] for row in rows])
+    # reshaped, because without rows both have a single axis
+    np.savez_compressed(
+        folder / POSES_FILE,
+        frames=np.array([row["frame"] for row in rows], dtype=np.int64),
+        seconds=np.array([row["seconds"] for row in rows]),
+        poses=poses.reshape(-1, 66),
+        translations=translations.reshape(-1, 3),
+        usable=np.array([row["usable"] for row in rows], dtype=bool),
+    )

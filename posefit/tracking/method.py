@@ -158,10 +158,8 @@ def prepare(options: TrackOptions, task: Task) -> Method:
     if prior_choice is None:
         return _tracker_method(optimiser, options.settings)
     offers = [optimiser]
-    prior = None
     if isinstance(prior_choice, str):
-        prior = registry().offer("prior", prior_choice)
-        offers.append(prior)
+        offers.append(registry().offer("prior", prior_choice))
     plugin_settings = parsed_settings(offers, options.settings)
     plugin_settings.setdefault("prior", {})
     stated = plugin_settings["optimiser"]
@@ -169,28 +167,15 @@ def prepare(options: TrackOptions, task: Task) -> Method:
     plugin_settings["optimiser"] = settings.check(
         optimiser.name, optimiser.factory, planned
     )
-    if prior is not None:
-        name = prior.name
-        label = prior.label
-        with _rules(prior):
-            learned = prior.factory(**plugin_settings["prior"])
-        with _rules(prior, "fit"):
-            learned = learned.fit(task.angles, task.body.skeleton)
-    else:
-        name = type(prior_choice).__name__
-        label = f"prior {name}"
-        learned = prior_choice
-    with plugin_errors(label, "the range, low and high,"):
-        learned = Checked(learned, label)
-    if task.training:
-        check_prior(learned, task.angles, task.body.skeleton, label)
+    prior_name, prior = _fitted_prior(prior_choice, plugin_settings["prior"], task)
+
     predicting: dict[str, Any] = {}
-    if prior is None:
+    if not isinstance(prior_choice, str):
         # The motions from which a fitted prior has learned are unknown, so that a tilt
         # that is learned from the task's motions does not fit it.
         predicting["tilt"] = "box"
     prediction = Prediction(**{**predicting, **plugin_settings["tracker"]})
-    tilt = prediction.tilted(learned, task.training)
+    tilt = prediction.tilted(prior, task.training)
 
     def make(space: Space, rng: np.random.Generator, evaluations: int) -> Optimiser:
         # schedules depend on the budget
@@ -201,17 +186,17 @@ def prepare(options: TrackOptions, task: Task) -> Method:
 
     searching = partial(
         SynthesisTracker,
-        prior=learned,
+        prior=prior,
         make=make,
         next_frame=optimiser.next_frame,
         prediction=prediction,
         tilt=tilt,
     )
-    label = f"{optimiser.name}@{name}"
-    audit = Audit(label, prediction.beta)
+    name = f"{optimiser.name}@{prior_name}"
+    audit = Audit(name, prediction.beta)
     return Method(
-        name=label,
-        prior=learned,
+        name=name,
+        prior=prior,
         settings=plugin_settings,
         looks_ahead=False,
         relocalise_gap=prediction.relocalise_gap,
@@ -219,6 +204,37 @@ def prepare(options: TrackOptions, task: Task) -> Method:
         follow=partial(drive, searching, audit),
         start=start_of(prediction.start),
     )
+
+
+def _fitted_prior(
+    chosen: str | Prior, values: Mapping[str, Any], task: Task
+) -> tuple[str, Latents]:
+    """Return a prior's name, and the prior fitted to a task's motions.
+
+    A prior that the caller fitted is only checked.
+
+    Args:
+        chosen: The name of a plugin's prior, or a fitted one.
+        values: The settings of the plugin's prior.
+        task: The task.
+    """
+    prior: Any = chosen
+    if isinstance(chosen, str):
+        offer = registry().offer("prior", chosen)
+        name = offer.name
+        label = offer.label
+        with _rules(offer):
+            prior = offer.factory(**values)
+        with _rules(offer, "fit"):
+            prior = prior.fit(task.angles, task.body.skeleton)
+    else:
+        name = type(chosen).__name__
+        label = f"prior {name}"
+    with plugin_errors(label, "the range, low and high,"):
+        checked = Checked(prior, label)
+    if task.training:
+        check_prior(checked, task.angles, task.body.skeleton, label)
+    return name, checked
 
 
 def start_of(name: str | None = None) -> InitialiserFactory | None:

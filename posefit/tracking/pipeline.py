@@ -5,7 +5,7 @@
 | `initialise` | the first pose and the person's build | initialise.py |
 | `track_hypotheses` | the frames of each hypothesis, by the tracker | this one |
 | `cheapest` | the frames of the cheapest hypothesis | trajectory.py |
-| `retrack_spins` | frames tracked again if the body spins | restarts.py |
+| `retrack_spins` | frames tracked again if the body spins | spins.py |
 | `smooth` | footage: a smooth path, planted feet, fitted contours | smoothing/ |
 | `with_straight_legs` | one camera: straighter legs | smoothing/standing.py |
 | `with_cheapest_legs` | one camera: some frames' legs exchanged | smoothing/legs.py |
@@ -50,7 +50,6 @@ from posefit.tracking.restarts import (
     initial_guess,
     joined,
     relocalised,
-    retrack_spins,
     reversed_task,
     stream,
     tracked_again,
@@ -60,6 +59,7 @@ from posefit.tracking.smoothing.contours import Borders
 from posefit.tracking.smoothing.legs import with_cheapest_legs
 from posefit.tracking.smoothing.smooth import Smoothed, smooth
 from posefit.tracking.smoothing.standing import with_straight_legs
+from posefit.tracking.spins import retrack_spins
 from posefit.tracking.trajectory import (
     Hypothesis,
     Tracked,
@@ -128,22 +128,24 @@ def track_scene(
     given = with_notes(on_device(scene, options.device), training)
     for warning in given.warnings:
         progress.warn(warning)
-    described = task_of(given, options, training)
+    first_task = task_of(given, options, training)  # without what a search adds
     if options.smooth:
         # SciPy has a BLAS too, and only a loaded BLAS can be limited
         import scipy.linalg  # noqa: F401
     # the matrices of optimisers are small, and BLAS is slower with more threads
     with threadpool_limits(1):
-        method = prepare(options, described)
-        budget = _budget(given, method, described.evaluations, options)
-        described = replace(described, evaluations=budget.evaluations)
+        method = prepare(options, first_task)
+        budget = _budget(given, method, first_task.evaluations, options)
+        first_task = replace(first_task, evaluations=budget.evaluations)
+
         with progress.phase("build"):
-            started = initialise(given, method, described, options, progress)
+            started = initialise(given, method, first_task, options, progress)
         if started.shape is not None:
             trim_memory()
         task = started.task
         scene = replace(given, body=task.body, cameras=task.cameras)
         effort = started.effort
+
         # the audit covers the track, not the search before its first frame
         method.audit.clear()
         with progress.phase("track"):
@@ -153,8 +155,9 @@ def track_scene(
             tracked = cheapest(scene, hypotheses, task.training)
             effort["frames"] = _evaluations(tracked.frames)
             tracked = _without_spins(scene, task, method, tracked, options, progress)
+
         result = Smoothed(scene, tracked.frames, started.shape)
-        smoothing = PoseCount()
+        smoothing = PoseCount()  # the poses that smoothing compares with masks
         if scene.count == 1 and scene.truth is None:
             result = _of_one_picture(result, task, method, budget.polishing, progress)
             effort["frames"] = _evaluations(result.frames)
@@ -174,16 +177,18 @@ def track_scene(
                 options.seed,
                 progress,
             )
+        # what spins, passes and smoothing added
         later = _evaluations(result.frames) - effort["frames"]
         later += round(smoothing.poses / len(result.scene.cameras))
         if later:
             effort["later_passes"] = later
+
         scene = with_turns(result.scene, given.cameras)
         for guess in _added(scene.guesses, given.guesses):
             progress.log(guess)
         # evaluating a track is not part of the method's effort
         with progress.phase("evaluate"), uncounted():
-            taken = clocks() - started.start + scene.reading_seconds
+            taken = clocks() - started.start_clocks + scene.reading_seconds
             seconds, cpu_seconds = taken.tolist()
             track = evaluate(
                 scene,
@@ -222,8 +227,8 @@ def _without_spins(
     tracked = retrack_spins(
         task, scene.observations, tracked, method.follow, options.seed
     )
-    if tracked.stay is not None:
-        first, last = tracked.stay
+    if tracked.kept_run is not None:
+        first, last = tracked.kept_run
         progress.log(
             "the body turned faster than a person can: tracked again before frame "
             f"{first} and after frame {last}"

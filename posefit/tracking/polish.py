@@ -27,7 +27,7 @@ from posefit.motion import built_in, recorded
 from posefit.motion.clips import training_clips, training_motions
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import known_views, pose_costs
-from posefit.tracking.initialise import guessed
+from posefit.tracking.restarts import guessed
 from posefit.uncertainty.modes import APART, Posterior, poses_apart
 
 POLISH_SHARE = 0.5  # the share of a frame's evaluations that is for polishing

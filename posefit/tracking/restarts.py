@@ -5,8 +5,9 @@
 | before the first frame | `best_restart`: searches and short trials | the cheapest |
 | after a gap, at high costs | `relocalised`: restarts, or none | the cheapest |
 | several hypotheses | `initial_guess`: poses with the same silhouette | the cheapest |
-| the body spins | `retrack_spins`: all but the longest run without | if as cheap |
 | several cameras | `tracked_again`: back, then onward | the cheapest |
+
+A body that spins is tracked again in spins.py.
 """
 
 import math
@@ -18,14 +19,11 @@ from itertools import islice
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from posefit.arrays import Array
 from posefit.fitting.carried import with_carried
 from posefit.fitting.driving import with_evaluations
 from posefit.fitting.space import ROOT_RANGE_DEGREES
 from posefit.fitting.tracker import Follow, Frame, Observation, Task, guessed_modes
-from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton
 from posefit.geometry.symmetry import (
@@ -35,23 +33,16 @@ from posefit.geometry.symmetry import (
     reflected_poses,
     turned_poses,
 )
-from posefit.motion.steadiness import runs
 from posefit.reading import counted
 from posefit.silhouette.drawn import PoseCount
 from posefit.silhouette.mask import coarser_camera, coarser_silhouette
-from posefit.tracking.trajectory import (
-    Tracked,
-    cheapest_sequence,
-    mean_cost,
-    with_effort_of,
-    with_total_effort,
-)
+from posefit.tracking.trajectory import with_effort_of
 from posefit.uncertainty.modes import Posterior
 
 # Part of the seed of each kind of repeated tracking.
 RNG_STREAMS = {"hypothesis": 2005, "spin": 450, "back": 1902, "pass": 1965}
 RESTARTS = 8  # searches of the first frame, at most
-MIN_WEIGHT = 0.05  # modes of the first frame with less weight are not tried
+MIN_MODE_WEIGHT = 0.05  # modes of the first frame with less weight are not tried
 TRIAL_FRAMES = 10  # frames that judge a restart
 # Every third frame, so that the trial lasts long enough to show which way the person
 # walks.
@@ -64,18 +55,6 @@ TYPICAL_COST_SECONDS = 1.0  # the typical cost is a median over at least this ti
 HIGH_COST_SECONDS = 0.5  # a track relocalises after high costs for this long
 # Key in the details of a frame that relocalised: whether a restart was better.
 RELOCALISED = "relocalised"
-# If removing the spins raises the cost of the track by this factor or more, the new
-# track is wrong: the person really turns that fast.
-SPIN_TOLERANCE = 1.5
-# Radians a second: the fastest turn of a person on the spot.
-MAX_TURN_RATE = np.radians(450.0)
-SPIN_SECONDS = 0.1
-# A turn by more than this within SPIN_SECONDS is a spin, even in a smoothed track.
-SPIN_ANGLE = np.radians(60.0)
-END_SECONDS = 0.5  # the run without spins is cut at most this far from its ends
-VOTES_PER_SECOND = 30.0
-# The penalty on a turn faster than a person's, in votes for each radian in excess.
-EXCESS_TURN_VOTES = 30.0
 SEARCHED = "searched"
 SEARCHED_AGAIN = "searched again"
 
@@ -91,7 +70,7 @@ def stream(
 
 
 def independent(rng: np.random.Generator) -> np.random.Generator:
-    """Return a generator seeded by the next draw of another, which is not changed."""
+    """Return a generator seeded by the next sample of another, which is not changed."""
     return np.random.default_rng(deepcopy(rng).integers(0, 2**63, 4))
 
 
@@ -178,39 +157,55 @@ def best_restart(
         cameras = [coarser_camera(camera, factor) for camera in task.cameras]
         trial = replace(trial, cameras=cameras)
         compared = [_coarser(observation, factor) for observation in chosen]
+
     prefix = [seed] if isinstance(seed, int) else [*seed]
+
+    def followed(start: Task, number: int) -> list[Frame]:
+        """Return the compared frames, followed with random numbers of their own."""
+        rng = np.random.default_rng([*prefix, number])
+        return list(follow(start, compared, rng))
+
     best = continuation or task
     least = np.inf
     tried = list[Frame]()
     if continuation is not None:
-        compared_task = replace(continuation, fps=trial.fps, cameras=trial.cameras)
-        rng = np.random.default_rng([*prefix, restarts + 1])
-        tried += follow(compared_task, compared, rng)
+        start = replace(continuation, fps=trial.fps, cameras=trial.cameras)
+        tried += followed(start, restarts + 1)
         least = _trial_cost(tried)
-    drawn = PoseCount()
-    with drawn.counting():
-        guessed = guessed_modes(task, chosen[0])[:restarts]
-    guess_evaluations = math.ceil(drawn.poses / len(task.cameras))
-    modes = [mode for weight, mode in guessed if weight >= MIN_WEIGHT]
+
+    weighted, guess_evaluations = guessed(task, chosen[0])
+    modes = [mode for weight, mode in weighted[:restarts] if weight >= MIN_MODE_WEIGHT]
     where = "anywhere"
     if modes:
         where = f"around {counted(len(modes), 'pose')} with such a silhouette"
     log(f"looking for the first pose {where}")
     starts = [around(trial, mode) for mode in modes] or [trial] * restarts
     for k, start in enumerate(starts):
-        frames = list(follow(start, compared, np.random.default_rng([*prefix, k])))
-        if not k and guess_evaluations:
+        frames = followed(start, k)
+        if k == 0 and guess_evaluations:
             used = frames[0].evaluations + guess_evaluations
             frames[0] = with_evaluations(frames[0], used)
         tried += frames
         if (cost := _trial_cost(frames)) < least:
             best = after(task, frames[0])
             least = cost
+
+    # the first frame of the best restart, at full resolution
     if factor > 1 and best is not (continuation or task):
         rng = np.random.default_rng([*prefix, restarts])
         tried.append(next(follow(best, chosen[:1], rng)))
         best = after(task, tried[-1])
     return best, tried
+
+
+def guessed(
+    task: Task, observation: Observation
+) -> tuple[Sequence[tuple[float, Posterior]], int]:
+    """Return modes of the poses that one picture may show, and their evaluations."""
+    count = PoseCount()
+    with count.counting():
+        modes = guessed_modes(task, observation)
+    return modes, math.ceil(count.poses / len(task.cameras))
 
 
 def _coarser(observation: Observation, factor: int) -> Observation:
@@ -432,76 +427,7 @@ def initial_guess(
     return name, replace(after(task, replace(first, pose=poses[name])), before=())
 
 
-# Tracking again after the last frame. A silhouette hardly distinguishes a body that
-# faces the camera from its reflection, which faces away. A track that confuses the two
-# for a while spins when it changes over, and when it changes back. Each of its frames
-# then votes for one of the two.
-
-
-def retrack_spins(
-    task: Task,
-    observations: Sequence[Observation],
-    tracked: Tracked,
-    follow: Follow,
-    seed: int,
-) -> Tracked:
-    """Return a track without spins.
-
-    Only the longest run of frames that face as most frames do is kept, between its best
-    ends; see `facing_consensus`. The person is followed onward from its last frame, and
-    backwards from its first frame with reversed training motions. The old track is kept
-    if the new one spins as often, or costs half as much again. Frames that are tracked
-    again get the effort of both tracks.
-
-    Args:
-        task: The task of the track.
-        observations: All frames.
-        tracked: The track.
-        follow: The tracker.
-        seed: The seed of the random numbers.
-
-    Returns:
-        The track. Its `stay` has the first and the last frame that were kept, or None
-        if all were.
-    """
-    frames = tracked.frames
-    usable = np.array([observation.usable for observation in observations])
-
-    def spins(track: Sequence[Frame]) -> int:
-        """Return in how many frames a track spins."""
-        yaws = np.array([frame.pose[0] for frame in track])
-        return int(spin_mask(yaws, usable, task.fps).sum())
-
-    before = spins(frames)
-    if not before:
-        return tracked
-    steady_runs = runs(facing_consensus(frames, task.cameras, usable, task.fps))
-    if not steady_runs:
-        return tracked
-    longest = max(steady_runs, key=lambda run: run[1] - run[0])
-    stay = best_ends(frames, *longest, task.fps)
-    first, last = stay
-    # without this limit the tracker would find the same spins again
-    steady = replace(task, fastest_turn=MAX_TURN_RATE)
-
-    def followed_from(number: int, steady: Task, rows: range) -> list[Frame]:
-        """Return the frames of all rows but the first, followed from the first."""
-        if len(rows) == 1:
-            return []
-        start = replace(after(steady, frames[rows[0]]), before=())
-        shown = (observations[k] for k in rows)
-        again = list(follow(start, shown, stream(seed, "spin", number)))
-        return joined(task.body.skeleton, again, frames[rows[0]])[1:]
-
-    ahead = followed_from(0, steady, range(last, len(frames)))
-    behind = followed_from(1, reversed_task(steady), range(first, -1, -1))
-    new = [*behind[::-1], *frames[first : last + 1], *ahead]
-    cheap = mean_cost(new, usable) < SPIN_TOLERANCE * mean_cost(frames, usable)
-    better = cheap and spins(new) < before
-    new = with_total_effort([frames, new], int(better))
-    # frames that were not tracked again have only their own effort
-    new[first : last + 1] = frames[first : last + 1]
-    return tracked._replace(frames=new, stay=stay if better else None)
+# Tracking again after the last frame.
 
 
 def tracked_again(
@@ -573,85 +499,3 @@ def joined(skeleton: Skeleton, behind: Sequence[Frame], ahead: Frame) -> list[Fr
             )
         frames.append(replace(frame, posterior=posterior))
     return frames
-
-
-def spin_mask(yaws: Array, usable: NDArray[np.bool_], fps: float) -> NDArray[np.bool_]:
-    """Return whether a body spins in each frame (T,).
-
-    Args:
-        yaws: (T,) radians.
-        usable: (T,) whether a frame shows enough of the person.
-        fps: Frames a second.
-    """
-    spins = np.zeros(len(yaws), dtype=bool)
-    reach = max(round(SPIN_SECONDS * fps), 1)
-    turned = np.abs(wrapped(yaws[reach:] - yaws[:-reach]))
-    for k in np.flatnonzero((turned > SPIN_ANGLE) & usable[reach:] & usable[:-reach]):
-        spins[k : k + reach + 1] = True
-    return spins
-
-
-def facing_consensus(
-    frames: Sequence[Frame],
-    cameras: Sequence[Camera],
-    usable: NDArray[np.bool_],
-    fps: float,
-) -> NDArray[np.bool_]:
-    """Return which frames (T,) agree with the likeliest sequence of yaws without spins.
-
-    Each frame faces either where it was estimated to face or where its reflection
-    faces. A reflection costs the votes of the frame, one for each camera that sees the
-    person. Frames that spin or show too little have no votes.
-
-    Args:
-        frames: The T frames of a track.
-        cameras: The cameras.
-        usable: (T,) whether a frame shows enough of the person.
-        fps: Frames a second.
-    """
-    yaws = np.array([frame.pose[0] for frame in frames])
-    steady = ~spin_mask(yaws, usable, fps)
-    # the clock stops during spins, so that they give no time to turn
-    rows = np.flatnonzero(usable & steady)
-    clock = steady.cumsum()
-    agrees = np.zeros(len(frames), dtype=bool)
-    if not len(rows):
-        return agrees
-    voters = [frames[k] for k in rows.tolist()]
-    views = np.array([frame.areas.any(axis=1) for frame in voters])
-    camera_yaws = [
-        facing(cameras[int(seeing.argmax())], frame.translation)
-        for frame, seeing in zip(voters, views, strict=True)
-    ]
-    reflected = 2.0 * np.array(camera_yaws) + np.pi - yaws[rows]
-    both = np.column_stack([yaws[rows], reflected])  # (n, 2)
-    votes = views.sum(axis=1) * VOTES_PER_SECOND / fps
-    against = np.column_stack([np.zeros(len(rows)), votes])  # (n, 2)
-    turned = np.abs(wrapped(both[1:, None] - both[:-1, :, None]))
-    seconds = (clock[rows[1:]] - clock[rows[:-1]]) / fps
-    excess = np.maximum(turned - MAX_TURN_RATE * seconds[:, None, None], 0.0)
-    agrees[rows] = cheapest_sequence(against, EXCESS_TURN_VOTES * excess) == 0
-    return agrees
-
-
-def best_ends(
-    frames: Sequence[Frame], start: int, stop: int, fps: float
-) -> tuple[int, int]:
-    """Return a good frame near the beginning of a run, and one near its end.
-
-    These are the frames that most cameras see, and of them the cheapest. At either end
-    of the whole track the run's own end is returned, because nothing continues there.
-    """
-    near = min(max(round(END_SECONDS * fps), 1), (stop - start + 1) // 2)
-
-    def rank(k: int) -> tuple[int, float]:
-        """Return the rank of a frame: more cameras first, then lower costs."""
-        return -int(frames[k].areas.any(axis=1).sum()), frames[k].cost
-
-    first = 0
-    if start:
-        first = min(range(start, start + near), key=rank)
-    last = stop - 1
-    if stop < len(frames):
-        last = min(range(stop - 1, stop - 1 - near, -1), key=rank)
-    return first, last

@@ -29,7 +29,7 @@ from posefit.motion.motion import Motion
 from posefit.output.content import Content, Setup, TrackingLog
 from posefit.output.folder import OutputFolder
 from posefit.output.pictures import page_of
-from posefit.output.text import table
+from posefit.output.text import detailed
 from posefit.progress import interactive
 from posefit.reading import quoted, suggestion
 from posefit.uncertainty.modes import TrackMode
@@ -80,7 +80,7 @@ class Track:
         return len(self.frames)
 
     def __str__(self) -> str:
-        return table(self.content)
+        return detailed(self.content)
 
     @property
     def summary(self) -> dict[str, Any]:

@@ -49,7 +49,7 @@ class Tracked(NamedTuple):
     hypotheses: list[dict[str, Any]]
     # the first and last frame that were kept when a spin was tracked again, see
     # `retrack_spins`
-    stay: tuple[int, int] | None = None
+    kept_run: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)

@@ -100,7 +100,7 @@ def quantiles(
     from scipy.special import ndtr
 
     spread = np.maximum(spreads, NARROWEST)
-    # A tracker draws its likeliest poses several times: of 24 points, 9 differ.
+    # A tracker samples its likeliest poses several times: of 24 points, 9 differ.
     points, numbers = np.unique(distances, axis=0, return_inverse=True)
     shares = np.bincount(numbers.ravel(), weights)
     away = np.maximum(points, CLOSE * spread)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit.footage import cut, extraction
+from posefit.footage import edge, extraction
 from posefit.footage import segmenter as segmenters
 from posefit.footage.kinds import resolve
 from posefit.footage.source import views_of_masks
@@ -153,7 +153,7 @@ def segmenter(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
                 offer if other == name else registry.offer(kind, other)
             ),
         )
-        for module in (extraction, segmenters, cut):
+        for module in (extraction, segmenters, edge):
             monkeypatch.setattr(module, "registry", lambda: changed)
 
     return register

@@ -21,7 +21,7 @@ from posefit.footage.images import read_image, read_marks
 from posefit.footage.kinds import resolve
 from posefit.footage.numbering import Images
 from posefit.footage.options import SourceOptions, text_person
-from posefit.footage.source import body_of, scene_of
+from posefit.footage.source import FilmedBody, scene_of
 from posefit.footage.views import View, empty_planes, release
 from tests.cases import each
 from tests.commands import error_of, run
@@ -273,7 +273,7 @@ def test_numbers_in_names_count_as_numbers(walk: list[Any], tmp_path: Path) -> N
             str(path / f"mask{k}.png"), np.where(walk[0], 255, 0).astype(np.uint8)
         )
     (path / "._mask1.png").write_bytes(b"what a Mac puts beside it")
-    (images,) = resolve(path).places
+    (images,) = resolve(path).materials
     assert isinstance(images, Images)
     assert [file.name for file in images.files] == [
         f"mask{k}.png" for k in (1, 2, 10, 100)
@@ -451,7 +451,7 @@ def test_views_of_videos_end_with_the_shortest(walk: list[Any], tmp_path: Path) 
         views.append(replace(masks, name=f"{name}.mp4", filmed=SIZE))
     scene = combined(
         views,
-        body_of(None, None)[0],
+        FilmedBody.of(SourceOptions()).body,
         [camera(np.pi / 2), camera(np.pi / 2)],
         SourceOptions(),
     )

@@ -19,7 +19,7 @@ from posefit.footage.options import SourceOptions
 from posefit.footage.readers import read_array
 from posefit.footage.scene import Scene
 from posefit.footage.source import scene_of, views_of_masks
-from posefit.footage.views import View, joined
+from posefit.footage.views import View, concatenated
 from posefit.progress import QUIET
 from tests.laws.sources import (
     COUNT,
@@ -45,6 +45,11 @@ START, STOP = 2, 6
 def seen(source: Any, **options: Any) -> Scene:
     """Return what a tracker gets of a source."""
     return scene_of(source, SourceOptions(**options))
+
+
+def rate(film: Any) -> dict[str, float]:
+    """Return the rate of a film as an option, unless its file states the rate."""
+    return {"fps": FPS} if resolve(film).medium == "pictures" else {}
 
 
 def check_numbered(scene: Scene, start: int, stop: int) -> None:
@@ -90,11 +95,9 @@ def how(tmp_path_factory: pytest.TempPathFactory) -> Extraction:
 def test_films_keep_their_numbers_and_a_cut_is_that_of_the_source(
     tmp_path: Path, kind: str, how: Extraction
 ) -> None:
-    options: dict[str, Any] = {"camera": [camera()], "extraction": how}
-    if "pictures" in kind:
-        options["fps"] = FPS
     images = pictures(masks())
     source = FILMS[kind](tmp_path / "all", images)
+    options: dict[str, Any] = {"camera": [camera()], "extraction": how, **rate(source)}
     check_numbered(seen(source, **options), 0, COUNT)
     chosen = seen(source, frames=(START, STOP), **options)
     check_numbered(chosen, START, STOP)
@@ -107,10 +110,8 @@ def test_films_keep_their_numbers_and_a_cut_is_that_of_the_source(
 def test_masks_that_were_extracted_give_the_track_of_the_film(
     tmp_path: Path, kind: str, frames: Any, how: Extraction
 ) -> None:
-    options: dict[str, Any] = {"camera": [camera()]}
-    if "pictures" in kind:
-        options["fps"] = FPS
     source = FILMS[kind](tmp_path / "film", pictures(masks()))
+    options: dict[str, Any] = {"camera": [camera()], **rate(source)}
     whole = seen(source, extraction=how, frames=frames, **options)
     extract(source, tmp_path / "out", how, frames=frames)
     later = seen(tmp_path / "out" / "masks.npz", **options)
@@ -172,7 +173,7 @@ def test_frames_of_a_stream_keep_their_numbers_and_times(
 ) -> None:
     frames = STREAMS[kind](masks(), pictures(masks()))
     views = [*live_views(Stream(frames, step), how, print)]  # type: ignore[arg-type]
-    view = joined(views)
+    view = concatenated(views)
     numbers = np.arange(0, COUNT, step)
     assert view.numbers.tolist() == numbers.tolist()
     np.testing.assert_allclose(view.times, 100.0 + numbers / FPS)
@@ -192,7 +193,7 @@ def test_a_joined_view_knows_what_each_of_its_parts_knows(
         if known:
             view = replace(view, known=np.zeros_like(view.bits))
         views.append(replace(view, landmarks=landmarks))
-    view = joined(views)
+    view = concatenated(views)
     assert len(view) == 5
     # frames of which some have no landmarks have none together
     assert view.landmarks is None
@@ -276,9 +277,8 @@ def test_every_file_of_a_track_has_the_numbers_and_times_of_the_footage(
         source = MASKS[kind](tmp_path / "in", masks())
     elif kind in FILMS:
         source = FILMS[kind](tmp_path / "in", pictures(masks()))
-        options |= {"extraction": how}
-        if "pictures" not in kind:
-            del options["fps"]
+        del options["fps"]
+        options |= {"extraction": how, **rate(source)}
     else:
         source = MOTIONS[kind](tmp_path, walk()) if kind in MOTIONS else NAMED[kind]
     if kind == ".amc":

@@ -20,7 +20,7 @@ from posefit.measuring.gait import (
 )
 from posefit.motion import built_in, recorded
 from posefit.motion.motion import Motion
-from posefit.output.text import gait_line, table
+from posefit.output.text import detailed, gait_line
 from tests.cases import each
 from tests.files import csv_rows
 from tests.measuring.walker import SPEED, STANCE, STRIDE, angle, walker
@@ -314,7 +314,7 @@ def test_a_track_of_a_walk_has_its_gait(tmp_path: Path) -> None:
     true = gait_of(tracked.truth)
     assert gait["cadence"] == pytest.approx(true.cadence, abs=3.0)
     assert gait["speed"] == pytest.approx(true.speed, abs=0.05)
-    assert gait_line(gait) in table(tracked.content).splitlines()
+    assert gait_line(gait) in detailed(tracked.content).splitlines()
     assert gait_line(gait).startswith(
         f"gait: {gait['cadence']:.0f} steps a minute, {gait['speed']:.2f} m/s, over "
     )

@@ -18,7 +18,7 @@ from posefit.geometry.body import varied
 from posefit.geometry.symmetry import mirrored_poses, turned_poses
 from posefit.motion.clips import training_clips
 from posefit.output.folder import OutputFolder
-from posefit.output.text import table
+from posefit.output.text import detailed
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
 from posefit.uncertainty.shared import depth_halves, in_footage, shared_spreads
@@ -308,7 +308,7 @@ def test_held_and_lost_frames_are_blank_for_other_programs_and_numbered_as_filme
     assert summary["lost_frames"] == [104]
     assert summary["lost_flagged_rate"] == pytest.approx(1 / 5)
     shares = "left and right unknown in 3 of 5, lost in 1 of 5 frames that show enough"
-    assert f"\n{shares} of the person\n" in table(result.content)
+    assert f"\n{shares} of the person\n" in detailed(result.content)
 
 
 def test_frames_and_tracks_have_modes_and_the_probability_that_none_is_right(
@@ -322,8 +322,8 @@ def test_frames_and_tracks_have_modes_and_the_probability_that_none_is_right(
     assert track.summary["modes"] == pytest.approx([0.75, 0.25])
     assert track.modes[0].poses.shape == (FRAMES, 66)
     # a body that faces the other way has its left where its right was
-    assert "left and right unknown in 6 of 6 frames" in table(track.content)
-    assert "lost in" not in table(track.content)
+    assert "left and right unknown in 6 of 6 frames" in detailed(track.content)
+    assert "lost in" not in detailed(track.content)
     # whose posteriors are no trajectories
     apart = tracked(scene, uncertain_frames(scene, CERTAIN, turned=0.25))
     assert len(apart.frames[0].modes) == 2

@@ -14,7 +14,7 @@ import pytest
 from posefit.fitting.tracker import Observation
 from posefit.measuring.angles import clinical_angles
 from posefit.output.page import stills
-from posefit.output.page.content import in_16_bits
+from posefit.output.page.data import in_16_bits
 from posefit.output.page.stills import Stills, Strip
 from posefit.page.document import embedded
 from posefit.silhouette.cost import project

@@ -27,15 +27,13 @@ from posefit.tracking.options import TrackOptions
 from posefit.tracking.pipeline import _cheapest_pass, track_hypotheses
 from posefit.tracking.restarts import (
     GUESSES,
-    MAX_TURN_RATE,
     SEARCHED_AGAIN,
-    facing_consensus,
     initial_guess,
     relocalised,
-    retrack_spins,
     tracked_again,
 )
 from posefit.tracking.smoothing.smooth import smooth
+from posefit.tracking.spins import MAX_TURN_RATE, facing_consensus, retrack_spins
 from posefit.tracking.trajectory import (
     MIN_TYPICAL_SPEED,
     WALKING_SPEED,
@@ -563,10 +561,10 @@ def test_a_track_that_spins_is_tracked_again_outside_its_longest_run_without_spi
                 30.0 + 0.1 * row, posterior=posterior(0.2 if rows[-1] else -0.2)
             )
 
-    retracked, _, stay = retrack_spins(
+    retracked, _, kept_run = retrack_spins(
         SPIN_TASK, OBSERVATIONS, Tracked(frames, []), follow, 0
     )
-    assert stay == (8, 19)  # frames of a spin have no vote
+    assert kept_run == (8, 19)  # frames of a spin have no vote
     new = [30.0 if 8 <= k <= 19 else 30.0 + 0.1 * k for k in range(28)]
     assert [np.degrees(f.pose[0]) for f in retracked] == pytest.approx(new)
     (onward, ahead), (back, behind) = calls
@@ -605,10 +603,10 @@ def test_a_track_that_gets_no_better_stays(
             yield frame(again[row], cost)
 
     frames = frames_facing(degrees)
-    kept, _, stay = retrack_spins(
+    kept, _, kept_run = retrack_spins(
         SPIN_TASK, OBSERVATIONS, Tracked(frames, []), follow, 0
     )
-    assert stay is None
+    assert kept_run is None
     assert [f.pose[0] for f in kept] == [f.pose[0] for f in frames]
     # nothing comes after what stays
     assert calls == ([list(range(11, -1, -1))] if tried else [])

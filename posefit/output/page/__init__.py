@@ -3,7 +3,7 @@
 | looking for | file |
 |---|---|
 | the document and its colours | this file |
-| the data of the page, as the scripts read them | content.py |
+| the data of the page, as the scripts read them | data.py |
 | small pictures of footage and masks, within a limited size | stills.py |
 | the empty layout and its style | track.html, track.css |
 | bodies of tapered cones on a canvas; a view that can be turned | body.js |
@@ -12,7 +12,7 @@
 | curves with intervals, and rows of marks | curves.js |
 | the player, its keys, and the text above and below it | main.js |
 
-The constant `D` is the data that content.py returns. `posefit.page` has the parts that
+The constant `D` is the data that data.py returns. `posefit.page` has the parts that
 all pages share.
 """
 

@@ -25,7 +25,12 @@ from posefit.geometry.symmetry import exchanged_limbs, mirrored_poses
 from posefit.motion.motion import Motion
 from posefit.silhouette.sharing import shares_of, work_through
 from posefit.tracking.smoothing.contours import Borders
-from posefit.tracking.smoothing.smooth import Smoothed, drawn, smooth, smoothed_motion
+from posefit.tracking.smoothing.smooth import (
+    Smoothed,
+    areas_and_costs,
+    smooth,
+    smoothed_motion,
+)
 from posefit.tracking.trajectory import cheapest_sequence, mean_cost
 from posefit.uncertainty.calibration import SECOND_SIDE
 
@@ -121,20 +126,21 @@ def legs_exchanged(
     costs = np.array([frame.cost for frame in smoothed.frames]) * usable
     # the frames as tracked (0), and with exchanged legs (1)
     tracks = [frames, [_exchanged(scene, frame) for frame in frames]]
-    here, there = (scene.motion(track) for track in tracks)
-    edges = doubtful(here, there, costs, usable)
-    odds = _odds(scene, here)
-    reach = max(round(TRIAL_SECONDS * scene.fps), 2)
+    motion, exchanged_motion = (scene.motion(track) for track in tracks)
+    edges = doubtful(motion, exchanged_motion, costs, usable)
+    odds = _odds(scene, motion)
     # a few steps are enough to see which stretches are beyond doubt
-    (quick,) = _smoothed_costs(scene, [there], beta, borders, QUICK_SCALES)
+    (quick,) = _smoothed_costs(scene, [exchanged_motion], beta, borders, QUICK_SCALES)
     near = max(round(DOUBT_SECONDS * scene.fps), 1)
     edges, anything = in_doubt(edges, near, costs, quick - costs + odds, usable)
     if not anything:
         return np.zeros(len(frames), dtype=bool)
-    costs_there, costs_here = _smoothed_costs(
-        scene, [there, here], beta, borders, threads=threads
+
+    exchanged_costs, unchanged_costs = _smoothed_costs(
+        scene, [exchanged_motion, motion], beta, borders, threads=threads
     )
-    added = costs_there - costs_here
+    added = exchanged_costs - unchanged_costs
+    reach = max(round(TRIAL_SECONDS * scene.fps), 2)
     exchanged = np.zeros(len(frames), dtype=np.int64)
     switches = []
     latest = 0  # whether legs are exchanged from the latest edge on
@@ -257,7 +263,7 @@ def in_doubt(
 
 
 def doubtful(
-    here: Motion, there: Motion, costs: Array, usable: NDArray[np.bool_]
+    motion: Motion, exchanged_motion: Motion, costs: Array, usable: NDArray[np.bool_]
 ) -> list[int]:
     """Return the frames from which legs may have to be exchanged.
 
@@ -265,18 +271,18 @@ def doubtful(
     near if the smoothed frame costs more than others.
 
     Args:
-        here: The motion.
-        there: The motion with exchanged legs.
+        motion: The motion.
+        exchanged_motion: The same with exchanged legs.
         costs: (T,) the costs of smoothed frames.
         usable: (T,) whether a frame shows enough of the person; others are left out.
     """
     legs, exchanged = (
-        root_centred(motion.skeleton.joints(motion.poses))[:, LEG_JOINTS]
-        for motion in (here, there)
+        root_centred(each.skeleton.joints(each.poses))[:, LEG_JOINTS]
+        for each in (motion, exchanged_motion)
     )
     squares = ((exchanged[1:] - legs[:-1]) ** 2).sum(axis=2)  # (T - 1, joints)
     off = np.append(np.inf, np.sqrt(squares.mean(axis=1)))  # (T,)
-    around = max(round(AROUND_SECONDS * here.fps), 1)
+    around = max(round(AROUND_SECONDS * motion.fps), 1)
 
     def least(values: Array) -> NDArray[np.bool_]:
         """Return whether each of values (T,) is the least of those around it."""
@@ -352,7 +358,7 @@ def _smoothed_costs(
                 scene, motions[number], None, beta, scales, borders
             )
             if len(rows):
-                _, costs[number, rows] = drawn(fitted, motion, rows, beta)
+                _, costs[number, rows] = areas_and_costs(fitted, motion, rows, beta)
 
     work_through(shares_of(len(motions), threads), threads, lambda _: (), smooth_part)
     return costs

@@ -22,7 +22,7 @@ from posefit.tracking.trajectory import mean_cost
 
 # Standard deviation of the filter of angles in frames that a single camera sees.
 STEADY_SECONDS = 1.0 / 30.0
-DRAWN_FRAMES = 300  # frames whose masks are unpacked together
+COMPARED_FRAMES = 300  # frames whose masks are unpacked together
 
 
 class Smoothed(NamedTuple):
@@ -58,7 +58,7 @@ def smooth(
     )
     # once more, because the contours pull at standing feet
     motion = smooth_path(motion, visibility)
-    areas, costs = drawn(scene, motion, np.arange(len(motion)), beta)
+    areas, costs = areas_and_costs(scene, motion, np.arange(len(motion)), beta)
     smoothed = [
         moved(frame, motion.poses[k], motion.translations[k], cost, areas[:, k])
         for k, (frame, cost) in enumerate(zip(frames, costs.tolist(), strict=True))
@@ -68,12 +68,13 @@ def smooth(
     return Smoothed(scene, smoothed, shape)
 
 
-def drawn(
+def areas_and_costs(
     scene: Scene, motion: Motion, rows: NDArray[np.int64], beta: float
 ) -> tuple[Areas, Array]:
     """Return the areas (views, n, 3) and the costs (n,) of some frames of a motion.
 
-    They are drawn in parts, so that the masks of a long film are not in memory at once.
+    Frames are compared in parts, so that the masks of a long film are not in memory at
+    once.
 
     Args:
         scene: The scene.
@@ -83,8 +84,8 @@ def drawn(
     """
     areas = list[Areas]()
     costs = list[Array]()
-    for start in range(0, len(rows), DRAWN_FRAMES):
-        part = rows[start : start + DRAWN_FRAMES]
+    for start in range(0, len(rows), COMPARED_FRAMES):
+        part = rows[start : start + COMPARED_FRAMES]
         observed = ObservedFrames.of(scene.observations[k] for k in part.tolist())
         areas.append(
             observed.areas_of(

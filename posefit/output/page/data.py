@@ -29,12 +29,8 @@ from posefit.version import __version__
 TENTH = 0.1  # degrees: the unit of angles in a page
 UNIT = np.radians(TENTH)
 MAX_16_BITS = 32_767
-COLUMN = (
-    "label",
-    "unit",
-    "digits",
-    "factor",
-)  # the fields of a figure that the page uses
+# the fields of a `Measure` that the page uses
+FIGURE_FIELDS = ("label", "unit", "digits", "factor")
 CURVES = (
     "mpjpe_mm",
     "error_degrees",
@@ -77,49 +73,19 @@ def track_data(content: Content, stills: Stills) -> dict[str, Any]:
     """
     scene = content.scene
     frames = content.frames
-    table = content.table
     setup = content.setup
     step = stills.step
     estimate = content.motion
-    intervals = content.intervals
     joints = estimate.joints[::step]
     origin = np.round(joints[0, 0], 3)
     truth = scene.truth
-    free = estimate.skeleton.free
-    angles = unwrapped(estimate.poses)[::step]
     true_joints = None
-    true_angles = None
     true_clinical = None
     if truth is not None:
         true_joints = in_16_bits(truth.joints[::step] - origin)
-        # within half a turn of the estimate, so that both curves can be compared
-        near = angles - wrapped(angles - truth.poses[::step])
-        true_angles = in_16_bits(near[:, free], UNIT)
         true_clinical = in_16_bits(_clinical(truth, step), TENTH)
-    shown_intervals = None
-    if intervals:
-        shown_intervals = {
-            "levels": [round(100 * level) for level in intervals["levels"].tolist()],
-            "joints": in_16_bits(intervals["joint_radii"][::step]),
-            "angles": in_16_bits(intervals["angle_halves"][::step, :, free], UNIT),
-        }
     quality = "" if truth is None else f": {brief(content)[0]}"
     day = time.strftime("%d %B %Y")
-    columns = {}
-    rows = {}
-    for name in CURVES:
-        if name in table:
-            columns[name] = {key: getattr(FRAME[name], key) for key in COLUMN}
-            rows[name] = table[name][::step].tolist()
-    marks = {}
-    for name, marked in MARKS.items():
-        # the number of a picture, as the page has one of every `step` frames
-        pictures = np.flatnonzero(marked(table)) // step
-        marks[name] = np.unique(pictures).tolist()
-    free_names = []
-    for name, is_free in zip(ANGLE_NAMES, free, strict=True):
-        if is_free:
-            free_names.append(name)
     return {
         "version": __version__,
         "title": setup.motion,
@@ -141,21 +107,60 @@ def track_data(content: Content, stills: Stills) -> dict[str, Any]:
         "estimate": in_16_bits(joints - origin),
         "truth": true_joints,
         "others": _others(scene, frames[::step], origin),
-        "columns": columns,
+        **_figures(content.table, step),
         "gait": _gait(content) if len(frames) > 1 else None,
-        "rows": rows,
-        "marks": marks,
-        "angles": {
-            "names": free_names,
-            "values": in_16_bits(angles[:, free], UNIT),
-            "truth": true_angles,
-        },
+        "angles": _angles(estimate, truth, step),
         "clinical": {
             "names": [name.replace("_", " ") for name in COLUMNS],
             "values": in_16_bits(_clinical(estimate, step), TENTH),
             "truth": true_clinical,
         },
-        "intervals": shown_intervals,
+        "intervals": _intervals(content, step),
+    }
+
+
+def _figures(table: Table, step: int) -> dict[str, Any]:
+    """Return the figures of frames, what they are, and which frames are marked."""
+    columns = {}
+    rows = {}
+    for name in CURVES:
+        if name in table:
+            columns[name] = {key: getattr(FRAME[name], key) for key in FIGURE_FIELDS}
+            rows[name] = table[name][::step].tolist()
+    marks = {}
+    for name, marked in MARKS.items():
+        # the number of a picture, as the page has one of every `step` frames
+        pictures = np.flatnonzero(marked(table)) // step
+        marks[name] = np.unique(pictures).tolist()
+    return {"columns": columns, "rows": rows, "marks": marks}
+
+
+def _angles(estimate: Motion, truth: Motion | None, step: int) -> dict[str, Any]:
+    """Return the angles that a skeleton leaves free, and their names."""
+    free = estimate.skeleton.free
+    angles = unwrapped(estimate.poses)[::step]
+    true_angles = None
+    if truth is not None:
+        # within half a turn of the estimate, so that both curves can be compared
+        near = angles - wrapped(angles - truth.poses[::step])
+        true_angles = in_16_bits(near[:, free], UNIT)
+    return {
+        "names": [ANGLE_NAMES[k] for k in np.flatnonzero(free)],
+        "values": in_16_bits(angles[:, free], UNIT),
+        "truth": true_angles,
+    }
+
+
+def _intervals(content: Content, step: int) -> dict[str, Any] | None:
+    """Return the intervals of joints and free angles; None without a posterior."""
+    intervals = content.intervals
+    if not intervals:
+        return None
+    free = content.motion.skeleton.free
+    return {
+        "levels": [round(100 * level) for level in intervals["levels"].tolist()],
+        "joints": in_16_bits(intervals["joint_radii"][::step]),
+        "angles": in_16_bits(intervals["angle_halves"][::step, :, free], UNIT),
     }
 
 
@@ -203,18 +208,18 @@ def _facts(content: Content) -> list[list[str]]:
 def _others(scene: Scene, frames: Sequence[Frame], origin: Array) -> dict[str, Any]:
     """Return the other likely poses: numbers of frames, weights and joints."""
     skeleton = scene.body.skeleton
-    places = []  # numbers of the frames that have another likely pose
+    numbers = []  # of the frames that have another likely pose
     weights = []
     joints = []
     for k, frame in enumerate(frames):
         mode = other_mode(skeleton, frame.modes, frame.pose, MIN_OTHER_WEIGHT)
         if mode is None:
             continue
-        places.append(k)
+        numbers.append(k)
         weights.append(mode.weight)
         joints.append(skeleton.joints(mode.pose, mode.translation) - origin)
     return {
-        "at": places,
+        "at": numbers,
         "weights": weights,
         "joints": in_16_bits(np.array(joints)),
     }

@@ -25,7 +25,7 @@ CUT_SECONDS = 2.0
 LOOK_STEP = MIN_DETECTIONS
 
 
-class CutWatch:
+class EdgeWatch:
     """Watches a pass through a film, frame after frame.
 
     Once everybody in the picture has been cut for two seconds, it looks ahead, at every
@@ -73,9 +73,9 @@ class CutWatch:
             cut += blobs[0].touches_border
             looked += 1
         if cut > MOST * looked:
-            room = scanner.stop - scanner.start
+            count = scanner.stop - scanner.start
             raise NoPersonError(
-                f"{scanner.video.path}: {at_edge(cut, looked)} looked at, of {room}"
+                f"{scanner.video.path}: {at_edge(cut, looked)} looked at, of {count}"
             )
 
 
