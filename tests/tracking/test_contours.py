@@ -162,7 +162,7 @@ def pull_of_view(
         view.corners[k],
         view.sizes[k],
         points,
-        view.step,
+        view.spacing,
         np.full(len(points), -1),
     )
     curves, slopes = pulled(here, mask, max(reach * root, twists.MIN_ROBUST_SCALE))
