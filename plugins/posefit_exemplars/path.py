@@ -127,13 +127,26 @@ class ClipPath:
         alone = len(first) == 1 and self._lag > 0 and not self._task.before
         for number, observation in enumerate(chain(first, coming)):
             frame_costs = FrameCosts(self._task, observation, alone)
-            latest = self._joined(frame_costs, latest, number % interval == 0, rng)
+            if latest is None:
+                latest = self._first(frame_costs, rng)
+            else:
+                everywhere = number % interval == 0
+                latest = self._next(frame_costs, latest, everywhere, rng)
             yield latest
 
-    def _joined(
+    def _first(self, frame_costs: FrameCosts, rng: np.random.Generator) -> _PathFrame:
+        """Return the first frame with its states, where paths begin."""
+        full, small = self._counts(frame_costs, is_first=True)
+        proposed, poses, used = self._proposals.first(frame_costs, small, rng)
+        beam, costs, evaluations = self._best(frame_costs, proposed, poses, full, used)
+        paths = markov.likeliest_paths(costs)
+        beam = replace(beam, totals=paths.totals)
+        return _PathFrame(beam, paths, frame_costs, evaluations)
+
+    def _next(
         self,
         frame_costs: FrameCosts,
-        latest: _PathFrame | None,
+        latest: _PathFrame,
         everywhere: bool,
         rng: np.random.Generator,
     ) -> _PathFrame:
@@ -141,22 +154,13 @@ class ClipPath:
 
         Args:
             frame_costs: The costs of the frame.
-            latest: The frame before, or None.
+            latest: The frame before.
             everywhere: Whether states from anywhere are proposed too.
             rng: The random numbers.
         """
-        full, small = self._counts(frame_costs, latest is None)
-        if latest is None:
-            proposed, poses, used = self._proposals.first(frame_costs, small, rng)
-            beam, costs, evaluations = self._best(
-                frame_costs, proposed, poses, full, used
-            )
-            paths = markov.likeliest_paths(costs)
-            return _PathFrame(
-                replace(beam, totals=paths.totals), paths, frame_costs, evaluations
-            )
         steps = ClipSteps.of(self.exemplars, latest.beam, self._step)
         if frame_costs.usable:
+            full, small = self._counts(frame_costs, is_first=False)
             proposed, poses, used = self._proposals.next(
                 frame_costs, steps, small, everywhere, rng
             )
@@ -176,9 +180,8 @@ class ClipPath:
             aligned=frame_costs.root is None,
         )
         paths = markov.likeliest_paths(costs, latest.paths, step_costs)
-        return _PathFrame(
-            replace(beam, totals=paths.totals), paths, frame_costs, evaluations
-        )
+        beam = replace(beam, totals=paths.totals)
+        return _PathFrame(beam, paths, frame_costs, evaluations)
 
     def _best(
         self, frame_costs: FrameCosts, beam: Beam, poses: Array, full: int, used: int

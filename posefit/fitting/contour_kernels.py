@@ -43,7 +43,7 @@ class Contours(NamedTuple):
     sizes: NDArray[np.int64]  # (T, 2)
     points: Array  # (n, 2) frame after frame
     starts: NDArray[np.int64]  # (T + 1,)
-    step: float
+    spacing: float
 
 
 class Views(NamedTuple):
@@ -58,7 +58,7 @@ class Views(NamedTuple):
     sizes: NDArray[np.int64]  # (V, 2)
     points: Array  # (n, 2) view after view
     starts: NDArray[np.int64]  # (V + 1,)
-    steps: Array  # (V,) pixels of the border that a point represents
+    spacings: Array  # (V,) pixels of the border that a point represents
 
 
 class Prior(NamedTuple):
@@ -124,7 +124,7 @@ def _write_view_sums(parents, radii, views, frames, owners, scale, sums):
     sums.forces[:] = 0.0
     # no factors: the build is held
     growth = Growth(np.empty((0, parents.size + 1, 3)), np.empty((0, parents.size, 2)))
-    for v in range(len(views.steps)):
+    for v in range(len(views.spacings)):
         first = views.starts[v]
         stop = views.starts[v + 1]
         if first < stop:
@@ -139,7 +139,7 @@ def _write_view_sums(parents, radii, views, frames, owners, scale, sums):
                 views.corners[v],
                 views.sizes[v],
                 views.points[first:stop],
-                views.steps[v],
+                views.spacings[v],
                 owners[first:stop],
             )
             add_view(parents, radii, camera, frames, contour, scale, growth, sums)
@@ -220,7 +220,7 @@ def add_frames(parents, radii, camera, frames, contours, scale, growth, sums):
                 contours.corners[k],
                 contours.sizes[k],
                 points,
-                contours.step,
+                contours.spacing,
                 np.full(len(points), -1),
             )
             grows = Growth(growth.joints[i], growth.radii)

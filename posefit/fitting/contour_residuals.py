@@ -47,7 +47,7 @@ class Contour(NamedTuple):
     corner: NDArray[np.int64]  # (2,) column and row of the field's first pixel
     size: NDArray[np.int64]  # (2,) rows and columns of the field
     points: Array  # (n, 2) pixels of the border
-    step: float  # pixels of the border that a point represents
+    spacing: float  # pixels of the border that a point represents
     # (n,) the bone nearest to each point in the step before, at first -1; each step
     # overwrites them
     owners: NDArray[np.int64]
@@ -236,12 +236,12 @@ def accumulate_borders(parents, centres, radii, contour, scale, hessians, gradie
     products = np.zeros((count, PRODUCTS))
     _accumulate_mask_border(contour, scale, cones, discs, products)
     neighbours = np.empty(count, np.int64)
-    points = empty_points(cones, contour.step)
+    points = empty_points(cones, contour.spacing)
     for b in range(count):
         # a bone with one disc covered by the other has no sides, and gets no points
         cone = cone_of(cones, b)
         if cone.length > abs(cone.taper) + TINY:
-            on_sides = write_side_points(cone, contour.step, points)
+            on_sides = write_side_points(cone, contour.spacing, points)
             drawn = write_cap_points(cone, points, on_sides)
             for i in range(_write_neighbours(b, discs, neighbours)):
                 hide(points, drawn, cone_of(cones, neighbours[i]))
@@ -265,7 +265,7 @@ def _accumulate_mask_border(contour, scale, cones, discs, products):
         bone = _nearest_bone(x, y, first, cones, discs)
         owners[i] = bone
         distance, share, nx, ny = cone_distance(x, y, cone_of(cones, bone))
-        weight = contour.step / (1.0 + (distance / scale) ** 2)  # contour (6)
+        weight = contour.spacing / (1.0 + (distance / scale) ** 2)  # contour (6)
         slope = -nx, -ny, -1.0  # contour (2)
         accumulate(products[bone], share, slope, distance, weight)
 
@@ -287,18 +287,18 @@ def _nearest_bone(x, y, first, cones, discs):
 
 
 @inlined
-def side_pieces(length, step):
+def side_pieces(length, spacing):
     """Return the number of pieces that each side of a bone is cut into, two or more."""
-    return max(int(length / (2.0 * step)) + 1, 2)
+    return max(int(length / (2.0 * spacing)) + 1, 2)
 
 
 @inlined
-def empty_points(cones, step):
+def empty_points(cones, spacing):
     """Return `Points` with room for the points of the longest bone."""
     longest = 0.0
     for b in range(cones.shape[0]):
         longest = max(longest, cone_of(cones, b).length)
-    room = 2 * (side_pieces(longest, step) + 1) + 4 * CAP
+    room = 2 * (side_pieces(longest, spacing) + 1) + 4 * CAP
     numbers = np.empty((6, room))
     return Points(
         numbers[0],
@@ -327,7 +327,7 @@ def _write_point(points, k, cone, share, normal, length):
 
 
 @inlined
-def write_side_points(cone, step, points):
+def write_side_points(cone, spacing, points):
     """Write points on the two sides of a bone's border. Return their number.
 
     The sides are the segments that touch both discs.
@@ -337,7 +337,7 @@ def write_side_points(cone, step, points):
     dy = cone.axis_y
     cosine = cone.taper / length
     sine = math.sqrt(1.0 - cosine * cosine)
-    pieces = side_pieces(length, step)
+    pieces = side_pieces(length, spacing)
     for i in range(pieces + 1):
         share = i / pieces
         # the first and the last point have only one neighbour: half a piece each

@@ -41,7 +41,7 @@ POINT_SPACING = 0.04
 STEP_EVALUATIONS = 27.0
 # for each round of a race, the scales of its steps and the share of the poses that take
 # part: the cheapest ones
-ROUNDS: Sequence[tuple[Sequence[float], float]] = (
+RACE_ROUNDS: Sequence[tuple[Sequence[float], float]] = (
     ((0.09, 0.065), 1.0),
     ((0.065, 0.045, 0.045), 0.33),
     ((0.033,) * 8, 0.1),
@@ -60,7 +60,7 @@ class MaskContours:
 
     # pixels below are this camera's; it has fewer of them than a fine mask has
     camera: Camera
-    step: float  # pixels of the border that a point represents
+    spacing: float  # pixels of the border that a point represents
     # (T, h, w) pixels outside the mask, negative within, and 0 if unknown
     fields: Distances = field(repr=False)
     # (T, 2) column and row of each field's first pixel
@@ -92,9 +92,9 @@ class MaskContours:
         """
         per_metre, factor = coarseness(camera, places)
         camera = coarser_camera(camera, factor)
-        step = max(round(float(np.median(per_metre / factor)) * spacing), 1)
+        interval = max(round(float(np.median(per_metre / factor)) * spacing), 1)
         traced = [
-            _border(observation, view, factor, step) for observation in observations
+            _border(observation, view, factor, interval) for observation in observations
         ]
         points = [border for border, _, _ in traced]
         corners = [corner for _, corner, _ in traced]
@@ -109,7 +109,7 @@ class MaskContours:
         starts = np.cumsum([0, *map(len, points)])
         return cls(
             camera,
-            float(step),
+            float(interval),
             fields,
             np.array(corners),
             sizes,
@@ -159,7 +159,12 @@ class MaskContours:
             for name in ("rotation", "translation", "focal", "centre")
         )
         contours = kernels.Contours(
-            self.fields, self.corners, self.sizes, self.points, self.starts, self.step
+            self.fields,
+            self.corners,
+            self.sizes,
+            self.points,
+            self.starts,
+            self.spacing,
         )
         kernels.add_frames(
             body.skeleton.chain.parents,
@@ -174,7 +179,7 @@ class MaskContours:
 
 
 def coarseness(camera: Camera, places: Array) -> tuple[Array, int]:
-    """Return pixels per metre (T,) at places (T, 3), and the step between used pixels.
+    """Return pixels per metre (T,) at places (T, 3), and which of the pixels are used.
 
     A mask that is finer than needed is read at every second, third, ... pixel only.
     """
@@ -185,11 +190,12 @@ def coarseness(camera: Camera, places: Array) -> tuple[Array, int]:
 
 
 def _border(
-    observation: Observation, view: int, factor: int, step: int
+    observation: Observation, view: int, factor: int, interval: int
 ) -> tuple[Array, tuple[int, int], Distances]:
-    """Return every `step`th point of a mask's border (n, 2), a corner, and distances.
+    """Return points of a mask's border (n, 2), a corner, and distances.
 
-    The corner is the column and row of the first pixel of the distances.
+    Of the mask's pixels every `factor`th is used, and of the points of the border every
+    `interval`th. The corner is the column and row of the first pixel of the distances.
     """
     nothing = np.empty((0, 2)), (0, 0), np.zeros((1, 1), dtype=np.float32)
     if not observation.usable:
@@ -209,7 +215,11 @@ def _border(
     pixels = np.concatenate([upright, level])
     rows, columns = box
     corner = columns.start, rows.start
-    return pixels[::step] + np.array(corner), corner, distances_outside(mask, around)
+    return (
+        pixels[::interval] + np.array(corner),
+        corner,
+        distances_outside(mask, around),
+    )
 
 
 def distances_outside(mask: Mask, around: Mask) -> Distances:
@@ -364,7 +374,7 @@ def _of_one_frame(views: Sequence[MaskContours]) -> kernels.Views:
         np.concatenate([view.sizes for view in views]),
         np.concatenate([view.points for view in views]),
         np.cumsum([0, *(len(view.points) for view in views)]),
-        np.array([view.step for view in views]),
+        np.array([view.spacing for view in views]),
     )
 
 
@@ -383,7 +393,7 @@ def race_count(evaluations: float) -> int:
 def _race_evaluations(count: int) -> float:
     """Return the evaluations of a race, with the costs of its `count` poses."""
     total = float(count)
-    for scales, share in ROUNDS:
+    for scales, share in RACE_ROUNDS:
         remaining = max(int(share * count), 1)
         total += remaining * len(scales) * STEP_EVALUATIONS
         # the costs that choose the cheapest poses
@@ -419,7 +429,7 @@ def contour_race(
     poses = start[0].copy()
     places = start[1].copy()
     evaluations = 0
-    for scales, share in ROUNDS:
+    for scales, share in RACE_ROUNDS:
         rows = np.arange(len(poses))
         remaining = max(int(share * len(poses)), 1)
         if remaining < len(poses):

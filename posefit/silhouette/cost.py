@@ -35,6 +35,7 @@ def drawing_of(body: Body, camera: Camera, silhouette: Silhouette) -> tuple[Any,
 def _drawing(
     body: Body, camera: Camera, observed: kernels.Observed, images: Bits
 ) -> tuple[Any, ...]:
+    """Return what `drawing_of` does, as plain tuples: see `kernels.count_areas`."""
     view = View(
         camera.rotation,
         camera.translation,
@@ -335,6 +336,6 @@ def masks_of(body: Body, camera: Camera, poses: Array, translations: Array) -> M
     nothing = np.zeros(strips_and_words(camera.width, camera.height), dtype=np.uint64)
     images = np.empty((len(poses), *nothing.shape), dtype=np.uint64)
     drawing = _drawing(body, camera, kernels.Observed(nothing, nothing, 0), images)
-    uncounted = np.empty((len(poses), 3), dtype=np.int64)
-    kernels.count_areas(*drawing, writeable(poses), writeable(translations), uncounted)
+    unused = np.empty((len(poses), 3), dtype=np.int64)  # areas
+    kernels.count_areas(*drawing, writeable(poses), writeable(translations), unused)
     return unpack(images, camera.width, camera.height)

@@ -31,17 +31,17 @@ class Observed(NamedTuple):
 
 
 @inlined
-def count(image, observed, valid, box):
+def count(image, person, valid, box):
     """Return the body's pixels and their overlap with the person; clear the image."""
     body = NONE
     overlap = NONE
     for strip in range(box.first_strip, box.last_strip + 1):
         words = image[strip][box.first_word : box.stop_word]
-        person = observed[strip][box.first_word : box.stop_word]
+        shown = person[strip][box.first_word : box.stop_word]
         known = valid[strip][box.first_word : box.stop_word]
         for i in range(words.size):
             body += popcount(words[i] & known[i])
-            overlap += popcount(words[i] & person[i])
+            overlap += popcount(words[i] & shown[i])
         for i in range(words.size):
             words[i] = NONE
     return body, overlap

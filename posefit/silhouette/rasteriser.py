@@ -374,7 +374,7 @@ def fill_pose(lane, stride, work):
     first_blocks = work.first_blocks
     differences = work.differences
     spans = work.spans
-    right_strip = 2 * image.shape[1]  # uint32 words from a strip to the next one
+    to_right = 2 * image.shape[1]  # uint32 words from a strip to the next one
     box, windows = bounding_box(lane, stride, bounds)
     for window in range(windows):
         count = list_blocks(
@@ -386,5 +386,5 @@ def fill_pose(lane, stride, work):
             differences[i] = _NEXT_BLOCK  # as the next list expects it
             word, row, k = block_parts(block)
             span_rows(spans, outlines, k, row)
-            set_spans(image, word, right_strip, spans)
+            set_spans(image, word, to_right, spans)
     return image, box

@@ -83,13 +83,14 @@ def _popcount_compiled(bits):  # noqa: ARG001
     return lambda bits: _ctpop(bits)  # type: ignore[call-arg]
 
 
-def set_spans(image: Any, place: Any, stride: Any, spans: Any) -> None:
+def set_spans(image: Any, word: Any, to_right: Any, spans: Any) -> None:
     """Set the bits of eight spans in a window of two strips.
 
-    `place` is the index of the first of eight uint32 words of the left strip in the bit
-    image; the words of the right strip are `stride` farther. `spans` (16,) are the
-    first bits of the spans, at least 0, and then their stop bits, at most 64. A span
-    with its stop before its first bit is empty. Bits from 32 on are in the right strip.
+    `word` is the index of the first of eight uint32 words of the left strip in the bit
+    image; the words of the right strip are `to_right` words further. `spans` (16,) are
+    the first bits of the spans, at least 0, and then their stop bits, at most 64. A
+    span with its stop before its first bit is empty. Bits from 32 on are in the right
+    strip.
     """
     pixels = image.reshape(-1).view(np.uint32)
     for k in range(BLOCK):
@@ -98,16 +99,16 @@ def set_spans(image: Any, place: Any, stride: Any, spans: Any) -> None:
         bits = 0
         if first < 2 * STRIP_PIXELS:
             bits = ((1 << stop) - (1 << first)) & 0xFFFFFFFFFFFFFFFF
-        pixels[place + k] |= np.uint32(bits & 0xFFFFFFFF)
-        pixels[place + stride + k] |= np.uint32(bits >> STRIP_PIXELS)
+        pixels[word + k] |= np.uint32(bits & 0xFFFFFFFF)
+        pixels[word + to_right + k] |= np.uint32(bits >> STRIP_PIXELS)
 
 
 @intrinsic
 def _set_spans(
     typing_context: Any,  # noqa: ARG001
     image: Any,
-    place: Any,  # noqa: ARG001
-    stride: Any,  # noqa: ARG001
+    word: Any,  # noqa: ARG001
+    to_right: Any,  # noqa: ARG001
     spans: Any,
 ) -> Any:
     return types.void(image, types.int64, types.int64, spans), _build_spans
@@ -116,9 +117,9 @@ def _set_spans(
 # Not `inline="always"`: when numba inlines a typed function it removes apparently dead
 # code, and it does not know that a row is a view of its block.
 @overload(set_spans)
-def _set_spans_compiled(image, place, stride, spans):  # noqa: ARG001
-    def compiled(image, place, stride, spans):
-        _set_spans(image, place, stride, spans)  # type: ignore[call-arg]
+def _set_spans_compiled(image, word, to_right, spans):  # noqa: ARG001
+    def compiled(image, word, to_right, spans):
+        _set_spans(image, word, to_right, spans)  # type: ignore[call-arg]
 
     return compiled
 
@@ -126,7 +127,7 @@ def _set_spans_compiled(image, place, stride, spans):  # noqa: ARG001
 def _build_spans(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     """Build `set_spans` as instructions for eight lanes of 32 bits."""
     vector = ir.VectorType(ir.IntType(32), BLOCK)
-    image, place, stride, spans = arguments
+    image, word, to_right, spans = arguments
 
     def splat(value: int) -> Any:
         return ir.Constant(vector, [value] * BLOCK)
@@ -159,13 +160,11 @@ def _build_spans(context: Any, builder: Any, signature: Any, arguments: Any) -> 
     stop = builder.select(builder.icmp_signed(">", stop, first), stop, first)
     # the bits from `first` on, without the bits from `stop` on; in the right strip both
     # are counted from the window's end
-    add_bits(
-        place, builder.xor(shifted(builder.shl, first), shifted(builder.shl, stop))
-    )
+    add_bits(word, builder.xor(shifted(builder.shl, first), shifted(builder.shl, stop)))
     first = builder.sub(splat(2 * STRIP_PIXELS), first)
     stop = builder.sub(splat(2 * STRIP_PIXELS), stop)
     add_bits(
-        builder.add(place, stride),
+        builder.add(word, to_right),
         builder.xor(shifted(builder.lshr, first), shifted(builder.lshr, stop)),
     )
     return context.get_dummy_value()

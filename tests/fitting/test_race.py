@@ -6,7 +6,7 @@ import pytest
 from posefit import Problem
 from posefit.arrays import Array
 from posefit.fitting.box import Start
-from posefit.fitting.contours import ROUNDS, STEP_EVALUATIONS, race_count
+from posefit.fitting.contours import RACE_ROUNDS, STEP_EVALUATIONS, race_count
 from posefit.fitting.race import FINALISTS, MIN_SHORT, MIN_WEIGHT, cheapest, race
 from posefit.testing.toy import Toy
 
@@ -60,7 +60,7 @@ def test_unlikely_modes_are_not_searched() -> None:
 def test_as_many_poses_race_as_the_evaluations_hold(evaluations: int) -> None:
     def needed(count: int) -> float:
         total = float(count)  # what they cost at the end
-        for scales, share in ROUNDS:
+        for scales, share in RACE_ROUNDS:
             fitted = max(int(share * count), 1)
             total += fitted * len(scales) * STEP_EVALUATIONS
             if fitted < count:

@@ -162,7 +162,7 @@ def pull_of_view(
         view.corners[k],
         view.sizes[k],
         points,
-        view.step,
+        view.spacing,
         np.full(len(points), -1),
     )
     curves, slopes = pulled(here, mask, max(reach * root, twists.MIN_ROBUST_SCALE))
@@ -480,11 +480,12 @@ def test_the_angle_of_turned_cameras_is_reported() -> None:
 def test_a_fit_that_costs_more_than_its_start_is_not_kept(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def astray(part: contours._Part, borders: object, scale: float) -> contours._Part:
-        moved = replace(part.fitted, translations=part.fitted.translations + 1.0)
-        return replace(
-            part, fitted=moved, body=shaped(part.body, np.full(len(NAMES), 0.9))
-        )
+    def astray(
+        window: contours._Window, borders: object, scale: float
+    ) -> contours._Window:
+        moved = replace(window.motion, translations=window.motion.translations + 1.0)
+        body = shaped(window.body, np.full(len(NAMES), 0.9))
+        return replace(window, motion=moved, body=body)
 
     scene, motion = footage(6)
     average = average_shape(scene)
