@@ -166,9 +166,7 @@ def _check_one_a_frame(
             _check_each_once(images, values[other], name)
 
 
-def _check_each_once(
-    images: Sequence[Path], numbers: Sequence[int], name: str
-) -> None:
+def _check_each_once(images: Sequence[Path], numbers: Sequence[int], name: str) -> None:
     """Raise InputError if two images have the same number."""
     first = dict[int, Path]()
     for number, image in zip(numbers, images, strict=True):
