@@ -91,7 +91,7 @@ def numbered(images: Sequence[Path], name: str) -> Numbered:
         return Numbered(list(images), [])
     numbers = [int(part[column]) for part in parts]
     if _texts_differ(parts):
-        _check_one_per_number(images, numbers, name)
+        _check_each_once(images, numbers, name)
     steps = np.diff(numbers)
     rising = bool((steps > 0).all())
     # names that differ in more than this number do not count frames by it alone
@@ -153,7 +153,7 @@ def _check_one_a_frame(
         return
     columns = _changing(parts)
     if len(columns) == 1 and len({file.parent for file in images}) > 1:
-        _check_one_per_number(images, [int(part[columns[0]]) for part in parts], name)
+        _check_each_once(images, [int(part[columns[0]]) for part in parts], name)
     if len(columns) != 2:
         return
     values = {column: [int(part[column]) for part in parts] for column in columns}
@@ -163,12 +163,10 @@ def _check_one_a_frame(
         is_named = _NO_FRAME.search(parts[0][column - 1])
         is_few = column > other and objects < frames and objects <= MOST_OBJECTS
         if (is_named or is_few) and 2 * len(images) >= objects * frames:
-            _check_one_per_number(images, values[other], name)
+            _check_each_once(images, values[other], name)
 
 
-def _check_one_per_number(
-    images: Sequence[Path], numbers: Sequence[int], name: str
-) -> None:
+def _check_each_once(images: Sequence[Path], numbers: Sequence[int], name: str) -> None:
     """Raise InputError if two images have the same number."""
     first = dict[int, Path]()
     for number, image in zip(numbers, images, strict=True):
