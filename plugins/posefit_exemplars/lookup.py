@@ -95,16 +95,19 @@ def _learned(exemplars: Exemplars, elevation: float) -> Arrays:
     yaws = np.tile(SAME_TURN * np.arange(YAWS), len(states))
     poses = exemplars.with_yaws(np.repeat(states, YAWS), yaws)
     camera = looking_at(0.0, elevation)
-    small = list[Codes]()
+    pixels = np.empty((len(poses), SIDE**2), np.float32)
+    filled = 0
     # in parts, because pictures take memory
     for part in np.array_split(poses, YAWS):
         masks = masks_of(body, camera, part, -body.skeleton.joints(part).mean(axis=1))
-        small.append(small_pictures(masks))
-    pixels = np.concatenate(small)
+        pixels[filled : filled + len(part)] = small_pictures(masks)
+        filled += len(part)
     mean = pixels.mean(axis=0)
     _, directions = np.linalg.eigh(np.cov(pixels[:: YAWS // 4], rowvar=False))
     axes = directions[:, : -DIMENSIONS - 1 : -1].astype(np.float32)
-    codes = (pixels - mean) @ axes
+    # in place: a copy would be as large as all else
+    pixels -= mean
+    codes = pixels @ axes
     return {
         "states": states,
         "mean": mean,

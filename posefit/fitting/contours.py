@@ -340,7 +340,8 @@ def fitted(
     poses = writeable(start[0].copy())
     places = writeable(start[1].copy())
     count_poses(STEP_EVALUATIONS * len(views) * len(poses) * len(scales))
-    targets = np.concatenate([start[1], means], axis=1)[:, free]
+    # in C order for any number of poses: others would be compiled separately
+    targets = np.take(np.concatenate([start[1], means], axis=1), free, axis=1)
     borders = _of_one_frame(views)
     scale_array = np.array(scales, dtype=np.float64)
 

@@ -1,10 +1,11 @@
 """The build of one person: factors on bone lengths and radii, fitted to a few frames.
 
-The poses of the frames are fitted in turns with the build.
+The poses of the frames are fitted in turns with the build: first they are tracked, then
+they are fitted to the contours of the masks.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -14,10 +15,11 @@ from posefit.arrays import Array
 from posefit.fitting.bodies import HeldFrames, scaled_bodies
 from posefit.fitting.box import Start
 from posefit.fitting.cma import CMAES, default_population_size
+from posefit.fitting.contours import ROBUST_SCALES, STEP_EVALUATIONS, contour_fit
+from posefit.fitting.cost import align
 from posefit.fitting.problem import Problem, minimise
-from posefit.fitting.tracker import Frame, Observation
+from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.body import Body
-from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import BONES, kind
 from posefit.silhouette.cost import BETA
 
@@ -97,6 +99,10 @@ PULL = 0.15  # cost of a build that is one spread away from the average
 # numbers are the spread of CMA-ES's first draws, in spreads of people, and how many
 # generations it makes. The second round begins near the result of the first.
 ROUNDS = ((0.5, 60), (0.2, 20))
+# How far poses are from those of the round before, once the body has changed: standard
+# deviations of angles, in radians, and of places, in metres; of known places too.
+POSE_DEVIATIONS = (np.radians(8.0), 0.05)
+KNOWN_PLACE_DEVIATION = 0.003
 
 
 def _members(groups: dict[str, tuple[str, ...]]) -> Array:
@@ -201,16 +207,13 @@ class Shape:
 
 
 def fit_shape(
-    body: Body,
-    cameras: Sequence[Camera],
+    task: Task,
     observations: Sequence[Observation],
     follow: Callable[[Body], Sequence[Frame]],
     rng: np.random.Generator,
     *,
     height: float | None = None,
-    aligned: bool = True,
     beta: float = BETA,
-    threads: int = 1,
 ) -> Shape:
     """Return the shape that fits all observations best, fitted in turns with the poses.
 
@@ -218,30 +221,60 @@ def fit_shape(
     among people.
 
     Args:
-        body: The body that is scaled.
-        cameras: The cameras.
+        task: The task, with the body that is scaled, the cameras, and whether places of
+            poses are known, or aligned for each body that is tried.
         observations: The frames.
         follow: Tracks the observations with a body.
         rng: The random numbers.
         height: The person's height in metres, or None if it is fitted. One camera alone
             cannot show how large a person is.
-        aligned: Whether the places of poses are aligned, for each body that is tried.
         beta: The weight in the cost, see `posefit.silhouette.cost`.
-        threads: Number of threads. Does not change the result.
     """
+    body = task.body
+    aligned = task.translation == "aligned"
 
     def cost(factors: Array) -> Array:
         """Return the mean costs (m,) of the frames for factors (m, 17)."""
         offsets, radii = scaled_bodies(body, *_scales(factors), height)
-        return held.costs(offsets, radii, aligned, beta, threads)
+        return held.costs(offsets, radii, aligned, beta, task.threads)
 
     factors = np.ones(len(NAMES))
+    frames: Sequence[Frame] = ()
     for width, generations in ROUNDS:
-        frames = follow(shaped(body, factors, height))
-        held = HeldFrames.of(body, cameras, observations, frames)
+        start = shaped(body, factors, height)
+        if not frames:
+            frames = follow(start)
+        else:
+            frames = _refitted(replace(task, body=start), observations, frames)
+        held = HeldFrames.of(body, task.cameras, observations, frames)
         factors = _search(cost, factors, rng, width, generations)
     fitted = shaped(body, factors, height)
     return Shape(fitted, factors, SPREAD, float(cost(factors[None])[0]), height)
+
+
+def _refitted(
+    task: Task, observations: Sequence[Observation], frames: Sequence[Frame]
+) -> list[Frame]:
+    """Return frames with poses and places fitted to the contours of the masks.
+
+    The task's body is another one than that of the frames. Tracking with it would take
+    twenty times as long, and fit the masks less well.
+    """
+    turn, shift = POSE_DEVIATIONS
+    if task.translation == "known":
+        shift = KNOWN_PLACE_DEVIATION
+    evaluations = int(len(ROBUST_SCALES) * STEP_EVALUATIONS)
+    refitted = []
+    for observation, frame in zip(observations, frames, strict=True):
+        place = frame.translation
+        if task.translation == "aligned":
+            scene = task.body, task.cameras, observation.silhouettes
+            place = align(*scene, frame.pose[None], place[None])[0]
+        pose, place, _ = contour_fit(
+            task, observation, (frame.pose, place), (turn, shift), evaluations
+        )
+        refitted.append(replace(frame, pose=pose, translation=place))
+    return refitted
 
 
 @dataclass(frozen=True, eq=False)

@@ -95,7 +95,10 @@ class View:
         """Decode and return the silhouette of frame k, counted from 0."""
         known = None
         if self.known is not None:
-            known = unpacked(self.known[k], self.size)
+            every = np.packbits(np.ones(self.size[0] * self.size[1], dtype=bool))
+            # None if all pixels are known: silhouettes then share one array
+            if not np.array_equal(self.known[k], every):
+                known = unpacked(self.known[k], self.size)
             release(self.known, k)
         mask = unpacked(self.bits[k], self.size)
         release(self.bits, k)

@@ -1,7 +1,7 @@
 """Masks and silhouettes, as bit images and at smaller sizes."""
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Protocol
 
 import cv2
@@ -137,8 +137,9 @@ class Silhouette:
             raise InputError(
                 f"mask must have shape (height, width), got {values.shape}"
             )
-        known = np.ones(values.shape, dtype=bool)
-        if valid is not None:
+        if valid is None:
+            known = _all_known(values.shape)
+        else:
             known = np.array(valid, dtype=bool)
         if known.shape != values.shape:
             raise InputError(
@@ -190,6 +191,15 @@ class Silhouette:
             float(right) if right < width else np.nan,
             float(bottom) if bottom < height else np.nan,
         )
+
+
+@lru_cache(maxsize=4)
+def _all_known(shape: tuple[int, ...]) -> Mask:
+    """Return the pixels of an image that are all known.
+
+    The silhouettes of a film share them, which is half of the memory of its masks.
+    """
+    return np.ones(shape, dtype=bool)
 
 
 class Device(Protocol):

@@ -195,19 +195,8 @@ def fitted_build(
             beta,
         )
         task = replace(task, cameras=fitted[0].cameras)
-    aligned = task.translation == "aligned"
     rng = np.random.default_rng(seed)
-    shape = fit_shape(
-        task.body,
-        task.cameras,
-        chosen,
-        frames_of,
-        rng,
-        height=height,
-        aligned=aligned,
-        beta=beta,
-        threads=task.threads,
-    )
+    shape = fit_shape(task, chosen, frames_of, rng, height=height, beta=beta)
     return shape, task.cameras
 
 

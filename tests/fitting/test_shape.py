@@ -1,6 +1,7 @@
 """The build of a person: factors on lengths and radii, and how well they are estimated."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from posefit.fitting.shape import (
     fit_shape,
     shaped,
 )
+from posefit.fitting.tracker import Task
 from posefit.geometry.body import Body, varied
 from posefit.geometry.skeleton import BONES
 from posefit.motion import built_in
@@ -36,6 +38,10 @@ def frames_at(places: Sequence[np.ndarray]) -> list[Frame]:
         Frame(pose, place, 0.0, nothing, 0)
         for pose, place in zip(POSES, places, strict=True)
     ]
+
+
+def known_roots(cameras: list[Camera]) -> Task:
+    return Task(AVERAGE, cameras, 1_000, 0.0, PLACES[0], translation="known")
 
 
 def observed(body: Body, cameras: list[Camera]) -> list[Observation]:
@@ -164,9 +170,7 @@ def test_a_build_is_estimated_where_the_poses_are_known() -> None:
     ]
     frames = frames_at(PLACES)
     observations = observed(true, cameras)
-    shape = fit_shape(
-        AVERAGE, cameras, observations, lambda _: frames, rng, aligned=False
-    )
+    shape = fit_shape(known_roots(cameras), observations, lambda _: frames, rng)
     assert shape.body.stature == pytest.approx(true.stature, rel=0.03)
     for bones in (("lfemur", "ltibia"), ("lhumerus",)):
         limb = [BONES.index(bone) for bone in bones]
@@ -174,6 +178,35 @@ def test_a_build_is_estimated_where_the_poses_are_known() -> None:
             body.skeleton.lengths[limb].sum() for body in (shape.body, true)
         )
         assert fitted == pytest.approx(expected, rel=0.06)
+
+
+def test_poses_are_tracked_once_and_then_fitted_to_contours_with_the_new_body() -> None:
+    true = varied(AVERAGE, 10.0, np.random.default_rng(5))
+    middle = WALK.translations.mean(axis=0)
+    cameras = [
+        Camera.around(middle, azimuth, 3.5, (320, 240)) for azimuth in (0.0, np.pi / 2)
+    ]
+    observations = observed(true, cameras)
+    # tracked poses that are a little off, as those of an average body are
+    off = np.radians(4.0) * np.random.default_rng(1).standard_normal(POSES.shape)
+    off *= np.append([False] * 3, AVERAGE.skeleton.free)[3:]
+    frames = [
+        replace(frame, pose=frame.pose + turn)
+        for frame, turn in zip(frames_at(PLACES), off, strict=True)
+    ]
+    tracked = list[Body]()
+
+    def follow(body: Body) -> list[Frame]:
+        tracked.append(body)
+        return frames
+
+    task = known_roots(cameras)
+    fitted = fit_shape(task, observations, follow, np.random.default_rng(0))
+    assert len(tracked) == 1
+    # the cost is that of poses nearer to the masks
+    held = HeldFrames.of(AVERAGE, cameras, observations, frames)
+    bodies = scaled_bodies(AVERAGE, *shape._scales(fitted.factors[None]), None)
+    assert fitted.cost < 0.5 * held.costs(*bodies, False, 0.4)[0]
 
 
 def test_one_camera_that_aligns_takes_the_height_as_known() -> None:
@@ -185,9 +218,8 @@ def test_one_camera_that_aligns_takes_the_height_as_known() -> None:
     ]
     frames = frames_at(places)
     rng = np.random.default_rng(0)
-    shape = fit_shape(
-        AVERAGE, [camera], observations, lambda _: frames, rng, height=1.55
-    )
+    task = replace(known_roots([camera]), translation="aligned")
+    shape = fit_shape(task, observations, lambda _: frames, rng, height=1.55)
     assert shape.body.stature == pytest.approx(1.55)
 
 
@@ -208,15 +240,8 @@ def test_a_camera_that_knows_nothing_does_not_count_and_beta_does(
 
     def fit(count: int, observations: list[Observation], **known: float) -> Shape:
         rng = np.random.default_rng(0)
-        return fit_shape(
-            AVERAGE,
-            cameras[:count],
-            observations,
-            lambda _: frames,
-            rng,
-            aligned=False,
-            **known,
-        )
+        task = known_roots(cameras[:count])
+        return fit_shape(task, observations, lambda _: frames, rng, **known)
 
     alone = fit(1, observations)
     both = fit(2, blind)

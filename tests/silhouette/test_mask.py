@@ -55,6 +55,18 @@ def test_shapes_are_checked() -> None:
         Silhouette.of(np.zeros((2, 3)), np.zeros((3, 2)))
 
 
+def test_silhouettes_whose_pixels_are_all_known_share_them_and_cannot_change_them() -> (
+    None
+):
+    first = Silhouette.of(np.eye(3))
+    second = Silhouette.of(np.zeros((3, 3)))
+    assert first.valid is second.valid
+    assert first.valid.all()
+    with pytest.raises(ValueError, match="read-only"):
+        first.valid[0, 0] = False
+    assert Silhouette.of(np.zeros((3, 4))).valid.shape == (3, 4)
+
+
 def test_any_value_but_0_is_the_person() -> None:
     for values in (
         np.array([[0, 255], [1, 0]], np.uint8),

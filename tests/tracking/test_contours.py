@@ -600,6 +600,28 @@ def test_poses_of_a_frame_are_fitted_alike_alone_together_and_by_several_threads
         np.testing.assert_array_equal(part[0], whole[4])
 
 
+@each("count", [1, 3])
+def test_one_pose_and_several_are_fitted_by_one_compiled_function(
+    count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene, motion = footage()
+    views = [
+        MaskContours.of(
+            scene.cameras[0], 0, scene.observations[:1], motion.translations[:1]
+        )
+    ]
+    targets = list[Array]()
+
+    def fit_poses(*arguments: Any) -> None:
+        targets.append(arguments[3].means)
+
+    monkeypatch.setattr(kernels, "fit_poses", fit_poses)
+    start = motion.poses[:count], motion.translations[:count]
+    fitted_to_frame(scene.body, views, start, start[0], precisions(0.1, 0.01), (0.09,))
+    # numba compiles a function for each memory order
+    assert [each.flags.c_contiguous for each in targets] == [True]
+
+
 def test_fits_share_the_borders_of_a_window(monkeypatch: pytest.MonkeyPatch) -> None:
     scene, motion = footage()
     observations = list(scene.observations)

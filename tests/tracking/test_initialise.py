@@ -260,7 +260,7 @@ def test_a_build_that_begins_late_looks_for_the_pose_again(
     )
     assert scene.fps == 30.0
     begun = (0.5, (first,)) if late < 15 else (None, ())  # half a second
-    expected = [begun] + [(frame.pose[0], (frame,))] * 2 if restarts else [begun] * 2
+    expected = [begun, (frame.pose[0], (frame,))] if restarts else [begun]
 
     def poses(before: Sequence[Frame]) -> list[list[float]]:
         return [earlier.pose.tolist() for earlier in before]

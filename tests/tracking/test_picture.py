@@ -15,9 +15,11 @@ from posefit.geometry.skeleton import JOINTS, PARENTS
 from posefit.geometry.symmetry import mirrored_poses
 from posefit.output import picture
 from posefit.output.drawing import (
+    BACKGROUND,
     BOTH,
     MISSED,
     OTHER,
+    blank,
     draw_bones,
     side_camera,
     width_of,
@@ -192,6 +194,14 @@ def test_lines_of_a_body_start_and_end_at_its_joints(
             assert image[int(y), int(x)].any(), (joint, share)
             drawn[int(y) - 3 : int(y) + 4, int(x) - 3 : int(x) + 4] = True
     assert not image[~drawn].any()
+
+
+def test_empty_pictures_are_drawn_on_separately() -> None:
+    first = blank(4, 6)
+    first[:] = 0
+    second = blank(4, 6)
+    assert second.shape == (4, 6, 3)
+    assert (second == BACKGROUND).all()
 
 
 def test_a_long_note_is_broken_into_lines_of_one_size() -> None:
