@@ -95,6 +95,9 @@ def numbered(images: Sequence[Path], name: str) -> Numbered:
     steps = np.diff(numbers)
     rising = bool((steps > 0).all())
     others = {(*part[:column], *part[column:][1:]) for part in parts}
+    # 1 and 01 are the same number
+    if len(others) == 1 and len(set(numbers)) < len({file.name for file in images}):
+        _check_each_once(images, numbers, name)
     if len(others) > 1 or not rising:
         listed = f"{name}: the frames are in the listed order, not by their numbers"
         return Numbered(list(images), [] if rising else [listed])
