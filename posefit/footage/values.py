@@ -156,14 +156,15 @@ class ValueCounts:
 
     def _several(self, name: object, labels: Sequence[float]) -> InputError:
         """Return the error for masks with several labels that could be the person."""
-        kind = "labels"
-        chosen = "--label N chooses one"
         if self.alpha:  # a label that is given is looked for in the colours
-            kind = "levels of transparency"
-            chosen = f"save them as grey levels, of which {chosen}"
+            return InputError(
+                f"{name}: expected masks of one person, got the levels of transparency "
+                f"{self._listed(labels)}; save them as grey levels, of which --label N "
+                "chooses one"
+            )
         return InputError(
-            f"{name}: expected masks of one person, got the {kind} "
-            f"{self._listed(labels)}; {chosen}"
+            f"{name}: expected masks of one person, got the labels "
+            f"{self._listed(labels)}; --label N chooses one"
         )
 
     @property

@@ -253,12 +253,17 @@ def _matrix(known: Mapping[str, Any]) -> Array:
     if key is None:
         return np.asarray(_pinhole(known))
     value = known[key]
-    expected = f"under the key {quoted(key)}, where a camera matrix (3, 3) should be"
     if _has_tables(value) and "data" not in value:
-        raise InputError(f"a table {expected}")
+        raise InputError(
+            f"a table under the key {quoted(key)}, where a camera matrix (3, 3) should "
+            "be"
+        )
     matrix = matrix_of(value)
     if matrix.size != 9:
-        raise InputError(f"{matrix.size} numbers {expected}")
+        raise InputError(
+            f"{matrix.size} numbers under the key {quoted(key)}, where a camera matrix "
+            "(3, 3) should be"
+        )
     return numbers_of(matrix.reshape(3, 3), (3, 3))
 
 
