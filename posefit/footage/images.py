@@ -129,7 +129,10 @@ def _decoded(
             warnings.simplefilter("ignore")
             with Image.open(path, formats=_FORMATS) as image:
                 if image.format == "PNG" and getattr(image, "n_frames", 1) > 1:
-                    raise InputError(f"{path}: expected one picture, got an animation")
+                    raise InputError(
+                        f"{path}: expected one picture, got an animation: save a "
+                        "picture a frame, or a GIF or WebP"
+                    )
                 for page in pages:
                     if page:
                         image.seek(page)
@@ -199,11 +202,16 @@ def _marks(image: Image.Image, labelled: bool) -> Marks:
     colours = np.asarray(image.convert("RGB"))
     red, green, blue = (colours[..., channel] for channel in range(3))
     if (red == green).all() and (red == blue).all():
+        # a palette may give several labels one grey
+        if _is_palette(image):
+            labels = np.asarray(image)
+            if len(np.unique(labels)) > len(np.unique(red)):
+                return Marks(labels)
         return Marks(red)
     # lossy compression tints grey images a little
     if image.format == "WEBP" and not _is_colourful(colours):
         return Marks(np.asarray(image.convert("L")), soft=True)
-    if image.mode == "P" and image.format != "GIF":
+    if _is_palette(image):
         return Marks(np.asarray(image))
     numbers = _colour_numbers(colours)
     photo = (
@@ -218,9 +226,10 @@ def _marks(image: Image.Image, labelled: bool) -> Marks:
 def _transparent_marks(image: Image.Image) -> Marks | None:
     """Return how transparent pixels mark a person; None if all pixels are opaque.
 
-    The alpha channel marks the person, with one exception. If it has only two values,
-    and the opaque pixels have few colours, then the colours are labels and transparent
-    pixels are 0. For a single label the mask is the same either way.
+    The alpha channel marks the person, with two exceptions. If it has only two values,
+    or the file has a palette, and the opaque pixels have few colours, then the colours
+    are labels and transparent pixels are 0. For a single label the mask is the same
+    either way. If its values cover flat areas, they are labels themselves.
     """
     coloured = np.asarray(image.convert("RGBA"))
     alpha = coloured[..., 3]
@@ -228,12 +237,17 @@ def _transparent_marks(image: Image.Image) -> Marks | None:
     if levels[0] == np.iinfo(alpha.dtype).max:
         return None
     soft = Marks(alpha, soft=True, alpha=True)
+    has_palette = _is_palette(image)
     if len(levels) > 2:
-        return soft
-    shown = alpha == levels[-1]
+        marks = np.asarray(image) if has_palette else alpha
+        if flat_share(marks) < MOST or len(levels) > MANY_COLOURS:
+            return soft
+        if not has_palette:
+            return Marks(alpha, alpha=True)
+    shown = alpha > 0
     if len(levels) == 1 or levels[0] > 0:
         return soft
-    if image.mode == "P" and image.format != "GIF":
+    if has_palette:
         numbers = np.asarray(image).astype(np.int32)
     else:
         numbers = _colour_numbers(coloured[..., :3])
@@ -242,6 +256,11 @@ def _transparent_marks(image: Image.Image) -> Marks | None:
     if len(labels) > MANY_COLOURS or not labels.any():
         return Marks(np.where(shown, alpha, 0), soft=True, alpha=True)
     return Marks(np.where(shown, numbers, 0))
+
+
+def _is_palette(image: Image.Image) -> bool:
+    """Return whether an image's indices may be labels; a GIF's are arbitrary."""
+    return image.mode == "P" and image.format != "GIF"
 
 
 def _colour_numbers(colours: NDArray[np.uint8]) -> NDArray[np.int32]:

@@ -100,6 +100,9 @@ def numbered(images: Sequence[Path], name: str) -> Numbered:
         rest = list(part)
         del rest[column]
         rests.add(tuple(rest))
+    # 1 and 01 are the same number
+    if len(rests) == 1 and len(set(numbers)) < len({file.name for file in images}):
+        _check_each_once(images, numbers, name)
     if len(rests) > 1 or not rising:
         listed = f"{name}: the frames are in the listed order, not by their numbers"
         return Numbered(list(images), [] if rising else [listed])

@@ -10,7 +10,7 @@ from posefit.errors import InputError
 from posefit.footage.images import IMAGES
 from posefit.footage.readers import ARRAYS
 from posefit.footage.straightening import calibration_for
-from posefit.geometry.calibration import Calibration, read_calibrations
+from posefit.geometry.calibration import Calibration, misreading, read_calibrations
 from posefit.geometry.camera import Camera
 from posefit.reading import cut
 
@@ -92,6 +92,13 @@ def calibrated(
         )
     if views > 1:
         _check_places(known)
+        # each file was checked by itself, but a file may be one camera
+        files = [camera for camera in known if isinstance(camera, Calibration)]
+        of_one_unit = len({camera.scale for camera in files}) == 1
+        if of_one_unit and (wrong := misreading(files)):
+            raise InputError(
+                f"cameras must be placed from the world to the camera, got {wrong}"
+            )
     if views > 1 and len(names) == views:
         known = [known[k] for k in order_by_name(known, names)]
     for camera, size in zip(known, filmed, strict=False):

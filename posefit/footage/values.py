@@ -28,6 +28,10 @@ NEAR_SCALE = 1.25
 # share of the highest value, unless that is a usual scale: resampled masks undershoot
 # 0 by at most this much
 RINGING = 0.1
+# share of the highest value: numbers less than this below 0 are noise
+NOISE = 0.03
+# share of pixels: if more are negative, resampling does not explain them
+NEGATIVE_SHARE = 0.25
 # (height, width): grey levels, an alpha channel, palette indices, or colours 0xRRGGBB
 Values = NDArray[Any]
 # turns values into the mask (height, width) of the person
@@ -47,6 +51,8 @@ class ValueCounts:
     fractions: bool = False  # whether some values are not whole numbers
     lowest: float = np.inf
     highest: float = 0.0
+    count: int = 0  # pixels
+    negative: int = 0  # the ones among these that are clearly below 0
     # pixels with each value; no longer counted once masks are soft
     pixels: Counter[int | float] = field(default_factory=Counter)
     # masks in which each value fills an area, and not only the edge between two others
@@ -64,6 +70,9 @@ class ValueCounts:
         self.fractions |= values.dtype.kind == "f" and bool(
             (values != np.floor(values)).any()
         )
+        self.count += values.size
+        if low < 0:
+            self.negative += int(np.count_nonzero(values < -NOISE * abs(high)))
         self.soft |= marks.soft
         if self.soft:
             return
@@ -147,6 +156,12 @@ class ValueCounts:
 
     def _several(self, name: object, labels: Sequence[float]) -> InputError:
         """Return the error for masks with several labels that could be the person."""
+        if self.alpha:  # a label that is given is looked for in the colours
+            return InputError(
+                f"{name}: expected masks of one person, got the levels of transparency "
+                f"{self._listed(labels)}; save them as grey levels, of which --label N "
+                "chooses one"
+            )
         return InputError(
             f"{name}: expected masks of one person, got the labels "
             f"{self._listed(labels)}; --label N chooses one"
@@ -158,15 +173,18 @@ class ValueCounts:
 
         It is rounded down, because whole numbers have no middle: 127 of 255. Numbers up
         to about 100 are percentages. Negative numbers are a network's logits, whose
-        middle is 0, unless they are so small that resampling explains them. An alpha
-        channel that is nowhere half opaque is a translucent colour.
+        middle is 0, unless they are so small and so few that resampling explains them:
+        it undershoots along edges, and logits are negative in the whole background. An
+        alpha channel that is nowhere half opaque is a translucent colour.
         """
         usual = any(
             0.5 * scale <= self.highest <= NEAR_SCALE * scale for scale in SCALES
         )
         # resampling undershoots 0 as far as it overshoots the scale
         below = NEAR_SCALE - 1.0 if usual else RINGING
-        if self.lowest < -below * self.highest:
+        # values of a usual scale are often a little below 0 in the whole background
+        mostly = not usual and self.negative > NEGATIVE_SHARE * self.count
+        if mostly or self.lowest < -below * self.highest:
             return 0.0, "logits"
         if self.alpha and self.highest <= SCALES[1] // 2:
             return float(self.highest // 2), "translucent"

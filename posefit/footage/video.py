@@ -31,6 +31,9 @@ HEAD_BYTES = 2_000  # bytes at the beginning of a file that tell whether it is t
 SQUARE_SHARE = 0.02  # share by which the sides of a pixel may differ and count as equal
 MAX_RATE = 1_000.0  # frames per second: files that state more do not know their rate
 MAX_CLAIMED = 1e9  # frames: files that state more do not know their length
+# cv2.CAP_PROP_PTS, the time of the last frame that was read, in frames; OpenCV before
+# 4.11 returns 0 or less
+PTS = 71
 FRAMES_AHEAD = 2  # frames that are decoded while earlier ones are in use
 # posefit reports once what is wrong with a file. A user may set the variable to see
 # FFmpeg's own messages
@@ -113,6 +116,9 @@ class Video:
         claimed = 0
         if 0.0 < head.claimed < MAX_CLAIMED and not is_uneven and not by_times:
             claimed = int(head.claimed)
+            # a length may be counted from a time before the first frame
+            if claimed - head.start >= len(order):
+                claimed -= head.start
         return cls(
             path,
             rate,
@@ -287,6 +293,7 @@ class _Head(NamedTuple):
     size: tuple[int, int]  # width and height of the first frame
     fps: float  # may be 0, NaN or absurd
     claimed: float  # number of frames; may be absurd
+    start: int  # how many frames would fit before the first one; 0 if unknown
     aspect: float | None  # width of a pixel over its height
 
 
@@ -315,13 +322,14 @@ def _read_head(path: Path) -> _Head:
             )
         fps = float(capture.get(cv2.CAP_PROP_FPS))
         claimed = float(capture.get(cv2.CAP_PROP_FRAME_COUNT))
+        start = max(0, int(capture.get(PTS)))
         across = float(capture.get(cv2.CAP_PROP_SAR_NUM))
         down = float(capture.get(cv2.CAP_PROP_SAR_DEN))
         _check_written(path, image, capture)
     finally:
         capture.release()
     aspect = across / down if across > 0.0 and down > 0.0 else None
-    return _Head((image.shape[1], image.shape[0]), fps, claimed, aspect)
+    return _Head((image.shape[1], image.shape[0]), fps, claimed, start, aspect)
 
 
 def _check_no_text(path: Path) -> None:

@@ -1,5 +1,6 @@
 """Writes video whose frames come when they like: a Matroska file of JPEG pictures, each with its own time stamp."""
 
+import struct
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -24,10 +25,12 @@ def write_matroska(
     milliseconds: Sequence[int],
     wide: int = 0,
     stated: int = 0,
+    lasts: float = 0.0,
 ) -> Path:
     """Return the file, in which image k is shown from `milliseconds[k]` on, and stretched to be so many pixels wide.
 
-    Its head has the duration of a frame at `stated` frames a second, where that is given.
+    Its head has the duration of a frame at `stated` frames a second, and how many milliseconds the film lasts, where
+    these are given.
     """
     height, width = images[0].shape[:2]
     head = _element(0x4282, b"matroska") + _number(0x4287, 4) + _number(0x4285, 2)
@@ -36,6 +39,7 @@ def write_matroska(
         + _element(0x4D80, b"tests")
         + _element(0x5741, b"tests")
     )
+    info += _element(0x4489, struct.pack(">d", lasts)) if lasts else b""
     picture = _number(0xB0, width) + _number(0xBA, height)
     picture += _number(0x54B0, wide) + _number(0x54BA, height) if wide else b""
     track = _number(0xD7, 1) + _number(0x73C5, 1) + _number(0x83, 1)

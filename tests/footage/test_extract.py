@@ -372,6 +372,26 @@ def test_a_rate_in_the_head_yields_to_even_time_stamps(
         assert video.claimed == 0  # counted by the head's rate
 
 
+@pytest.mark.skipif(
+    not hasattr(cv2, "CAP_PROP_PTS"), reason="OpenCV does not say when a film begins"
+)
+@each("start", [0, 40, 3000])
+@each("missing", [0, 5])
+def test_the_time_before_the_first_frame_has_no_frames(
+    tmp_path: Path, start: int, missing: int
+) -> None:
+    images = [np.full((48, 64, 3), 4 * k, np.uint8) for k in range(20)]
+    path = write_matroska(
+        tmp_path / "a.mkv",
+        images,
+        [start + 40 * k for k in range(20)],
+        stated=25,
+        # as programs write it that cut a longer film
+        lasts=start + 40.0 * (20 + missing),
+    )
+    assert Video.of(path).claimed == 20 + missing
+
+
 def test_a_very_short_frame_does_not_make_thousands(tmp_path: Path) -> None:
     video = grey(tmp_path / "a.mkv", [0, 1, 2, 3, 400, 800, 1200])
     assert video.count() <= 4 * 7

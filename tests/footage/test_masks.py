@@ -640,6 +640,30 @@ def test_labels_before_a_transparent_background_are_labels(
     check(tmp_path / "several", walk, label)
 
 
+@each("kind", ["palette", "alpha", "black"])
+def test_flat_levels_of_transparency_are_labels(
+    walk: list[Any], tmp_path: Path, kind: str
+) -> None:
+    path = tmp_path / "a"
+    path.mkdir()
+    for k, numbers in enumerate(labelled(walk)):
+        file = path / f"{k}.png"
+        if kind == "palette":  # an alpha for each of its colours
+            steps = bytes(range(0, 250, 250 // len(PALETTE)))
+            indexed(file, numbers, PALETTE, transparency=steps)
+        elif kind == "black":  # a palette that was never set
+            indexed(file, numbers, [(0, 0, 0)] * len(PALETTE))
+        else:
+            colours = np.full((*numbers.shape, 4), 90, dtype=np.uint8)
+            colours[..., 3] = 60 * numbers
+            assert cv2.imwrite(str(file), colours)
+    what = "levels of transparency" if kind == "alpha" else "labels"
+    with pytest.raises(ValueError, match=f"got the {what} .*--label N chooses"):
+        read_masks(path, ALL)
+    if kind != "alpha":
+        check(path, walk, 2)
+
+
 @each("alpha", [40, 89, 127, 128, 153, 254])
 def test_a_translucent_colour_is_the_person(
     walk: list[Any], tmp_path: Path, alpha: int
@@ -705,7 +729,14 @@ def test_a_void_border_is_not_the_person(
     check(path, walk, label if wide > 1 else None)
 
 
-@each(("lowest", "highest"), [(-3.0, 20.0), (-20.0, 3.0), (-8.0, 60.0), (-40.0, 70.0)])
+@each(
+    ("lowest", "highest"),
+    [
+        *((-3.0, 20.0), (-20.0, 3.0), (-8.0, 60.0), (-40.0, 70.0)),
+        # less below 0 than resampling explains, but in the whole background
+        *((-2.0, 25.0), (-1.0, 30.0)),
+    ],
+)
 def test_logits_are_cut_at_zero_however_high_they_go(
     walk: list[Any], tmp_path: Path, lowest: float, highest: float
 ) -> None:

@@ -66,6 +66,15 @@ def test_several_files_of_pages_belong_to_several_cameras(
         sources_of([*films, single])
 
 
+def test_one_number_written_in_two_ways_is_refused(
+    walk: list[Any], tmp_path: Path
+) -> None:
+    for name, image in zip(("1", "01", "2"), drawn(walk), strict=False):
+        image.save(tmp_path / f"{name}.png")
+    with pytest.raises(InputError, match="one image a frame, got 01.png and 1.png"):
+        read_masks(tmp_path, ALL)
+
+
 @each("suffix", [".gif", ".webp", ".tif"])
 def test_a_folder_of_images_of_any_kind_is_read_as_by_pillow(
     walk: list[Any], tmp_path: Path, suffix: str

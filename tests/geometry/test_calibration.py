@@ -138,6 +138,11 @@ def test_qualisys_third_radial_number_is_opencvs_fifth(tmp_path: Path) -> None:
         (
             "a.json",
             json.dumps({"K": K, "R": np.eye(3).tolist(), "C": [0.0, 1.0, 2.0]}),
+            "the key 'C' of 'a', which is not known",
+        ),
+        (
+            "a.json",
+            json.dumps({"K": K, "R": np.eye(3).tolist()}),
             "a rotation without a translation, such as rvec and tvec",
         ),
         ("a.json", json.dumps({"Camera.fx": 500.0}), "got none among 'Camera.fx'"),

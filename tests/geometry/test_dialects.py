@@ -1,6 +1,8 @@
 """Calibrations of each program: axes, units and lenses by hand, and what a program is not known to write."""
 
 import json
+from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -8,15 +10,15 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
-from posefit.errors import InputError
 from posefit.geometry.calibration import DIALECTS, Calibration, read_calibrations
+from posefit.geometry.calibration.lens import OPENGL
 from posefit.geometry.calibration.read import dialect_of
 from posefit.geometry.calibration.values import stored
-from posefit.geometry.calibration.world import check_places
+from posefit.geometry.calibration.world import misreading
 from posefit.geometry.camera import Camera
 from tests.cases import each
 from tests.geometry import programs
-from tests.geometry.calibrations import QUALISYS
+from tests.geometry.calibrations import QUALISYS, ROS
 from tests.geometry.programs import SAMPLES
 
 # that do not say where a camera stands
@@ -92,6 +94,7 @@ def test_a_known_point_has_the_position_worked_out_by_hand(
         ("OpenCap", {"k7": 0.1}, "k7"),
         ("Kalibr", {"T_imu_cam": programs.FROM_WORLD}, "T_imu_cam"),
         ("Kalibr", {"camera_model": "omni"}, "omni"),
+        ("Kalibr", {"camera_model": "ds", "intrinsics": [0.5, 0.6, 500.0, 500.0, 309.5, 249.5]}, "ds"),
         ("Kalibr", {"distortion_model": "fov"}, "fov"),
         ("ROS", {"crop": 3}, "crop"),
         ("ROS", {"distortion_model": "fov"}, "fov"),
@@ -103,6 +106,12 @@ def test_a_known_point_has_the_position_worked_out_by_hand(
         ("Anipose", {"crop": [3, 4]}, "crop"),
         ("Anipose", {"p3": 0.1}, "p3"),
         ("OpenCV", {"zoom": 2.0}, "zoom"),
+        # the other half of a pose is the mistake, and not that it is missing
+        ("OpenCV", {"rvec": None, "quaternion": [1.0, 0.0, 0.0, 0.0]}, "quaternion"),
+        ("OpenCV", {"rvec": None, "euler": [90.0, 0.0, 0.0]}, "euler"),
+        ("OpenCV", {"tvec": None, "camera_position": [0.0, -4.0, 1.0]}, "camera_position"),
+        ("OpenCV", {"tvec": None, "C": [0.0, -4.0, 1.0]}, "C"),
+        ("OpenCV", {"camera_matrix": None, "k": [0.1, 0.2, 0.0]}, "k"),
         ("OpenCV", {"axis_convention": "opengl"}, "axis_convention"),
         ("OpenCV", {"pitch_deg": 8.0, "rvec": None, "tvec": None}, "pitch_deg"),
     ],
@@ -119,6 +128,63 @@ def test_a_key_that_a_program_does_not_write_is_refused_by_name(
     message = refused(tmp_path, text, suffix)
     assert f"expected a calibration of {program}, got " in message
     assert repr(key) in message
+
+
+@each("program", ["Kalibr", "CMU Panoptic", "RealSense", "Anipose", "OpenCV"])
+@each("key", ["T_world_rig", "camera_to_world", "extrinsics"])
+def test_a_place_beside_the_cameras_is_refused_by_name(
+    tmp_path: Path, program: str, key: str
+) -> None:
+    write, suffix, _ = SAMPLES[program]
+    place = np.eye(4).tolist()
+    if suffix == ".toml":
+        text = f"{key} = {place}\n{write()}"
+    else:
+        values = json.loads(write())
+        if program in ("RealSense", "OpenCV"):
+            values = {"left": values}
+        text = json.dumps({**values, key: place})
+    assert repr(key) in refused(tmp_path, text, suffix)
+
+
+@each(
+    ("more", "words"),
+    [
+        ({"rvec": [1.0, 0.0, 0.0, 0.0]}, "a quaternion [1.0, 0.0, 0.0, 0.0]"),
+        ({"camera_matrix": np.transpose(programs.K).tolist()}, "transpose it"),
+        ({"camera_matrix": [500.0, 500.0, 309.5, 249.5]}, "4 numbers under the key"),
+        ({"camera_matrix": {"mu": 500.0, "mv": 500.0}}, "a table under the key"),
+        ({"camera_matrix": None, "f": 500.0}, "but no camera matrix, and no fx, fy"),
+    ],
+)
+def test_a_value_of_another_form_is_refused_with_what_it_is(
+    tmp_path: Path, more: dict[str, Any], words: str
+) -> None:
+    values = {**json.loads(programs.opencv()), **more}
+    text = json.dumps({k: v for k, v in values.items() if v is not None})
+    assert words in refused(tmp_path, text)
+
+
+def test_a_message_that_ends_with_the_next_ones_beginning_is_read(
+    tmp_path: Path,
+) -> None:
+    assert one_of(tmp_path, f"{ROS}---\n", ".yaml").size == SIZE
+
+
+def test_a_tag_of_metashapes_without_a_number_is_passed_over(tmp_path: Path) -> None:
+    text = programs.metashape("<covariance><params>f</params></covariance>")
+    assert one_of(tmp_path, text, ".xml").size == SIZE
+
+
+def test_rotation_vectors_of_easymocap_suffice(tmp_path: Path) -> None:
+    (tmp_path / "intri.yml").write_text(programs.easymocap())
+    values = json.loads(programs.easymocap())
+    for key in ("K_left", "dist_left", "Rot_left", "H_left", "W_left"):
+        del values[key]
+    path = tmp_path / "extri.yml"
+    path.write_text(json.dumps(values))
+    (one,) = read_calibrations(path)
+    np.testing.assert_allclose(one.position, [0.0, -4.0, 1.0], atol=1e-6)
 
 
 @each("angle", [40.0, 0.0, -0.5, 3.2])
@@ -440,18 +506,48 @@ def placed(turns: Array, moved: Array) -> list[Calibration]:
     ]
 
 
+def turned_back(turns: Array) -> Array:
+    return turns.swapaxes(1, 2)
+
+
+# Poses that are not camera_from_world with y down: each is a function of rotations,
+# translations and positions, words of the message, and by the number of cameras the
+# least share of rigs of which it is said.
+MISWRITTEN: dict[str, tuple[Callable[..., tuple[Array, Array]], str, dict[int, float]]]
+MISWRITTEN = {
+    "positions": (
+        lambda turns, moved, places: (turns, places),
+        "the cameras' positions",
+        {2: 0.7, 4: 0.85},
+    ),
+    "inverse": (
+        lambda turns, moved, places: (turned_back(turns), places),
+        "invert them",
+        {2: 0.3, 4: 0.6},
+    ),
+    "transposed": (
+        lambda turns, moved, places: (turned_back(turns), moved),
+        "transpose them",
+        {2: 0.25, 4: 0.6},
+    ),
+    "along -z": (
+        lambda turns, moved, places: (OPENGL @ turns, moved @ OPENGL),
+        "look along -z with y up",
+        {2: 0.8, 4: 0.9},
+    ),
+    "inverse along -z": (
+        lambda turns, moved, places: (turned_back(OPENGL @ turns), places),
+        "cameras that look along -z",
+        {2: 0.2, 4: 0.6},
+    ),
+}
+
+
 def test_of_random_rigs_few_are_mistaken_and_most_places_are_recognised() -> None:
     rng = np.random.default_rng(5)
-
-    def refused(turns: Array, moved: Array) -> bool:
-        try:
-            check_places(placed(turns, moved))
-        except InputError:
-            return True
-        return False
-
-    for count, most_wrong, least_right in ((2, 0.01, 0.7), (4, 0.002, 0.85)):
-        wrong = right = 0
+    for count, most_wrong in ((2, 0.01), (4, 0.002)):
+        wrong = 0
+        recognised = Counter[str]()
         for _ in range(500):
             angles = rng.uniform(0.0, 2.0 * np.pi, count)
             far = rng.uniform(2.5, 6.0, count)
@@ -462,10 +558,14 @@ def test_of_random_rigs_few_are_mistaken_and_most_places_are_recognised() -> Non
             aside = np.cross(ahead, [0.0, 0.0, 1.0])
             aside /= np.linalg.norm(aside, axis=1, keepdims=True)
             turns = np.stack([aside, np.cross(ahead, aside), ahead], axis=1)
-            wrong += refused(turns, -np.einsum("nij,nj->ni", turns, places))
-            right += refused(turns, places)
+            moved = -np.einsum("nij,nj->ni", turns, places)
+            wrong += bool(misreading(placed(turns, moved)))
+            for kind, (write, words, _) in MISWRITTEN.items():
+                sentence = misreading(placed(*write(turns, moved, places)))
+                recognised[kind] += words in sentence
         assert wrong <= most_wrong * 500
-        assert right >= least_right * 500
+        for kind, (_, _, shares) in MISWRITTEN.items():
+            assert recognised[kind] >= shares[count] * 500, kind
 
 
 def test_parallel_cameras_are_not_mistaken_for_places(tmp_path: Path) -> None:

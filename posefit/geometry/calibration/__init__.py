@@ -23,7 +23,13 @@ sentence `expected a calibration ..., got ...`.
 
 from posefit.geometry.calibration.lens import Calibration, pinhole_matrix
 from posefit.geometry.calibration.read import DIALECTS, read_calibrations
-from posefit.geometry.calibration.world import TURNS, Up, guessed_up, upright
+from posefit.geometry.calibration.world import (
+    TURNS,
+    Up,
+    guessed_up,
+    misreading,
+    upright,
+)
 
 __all__ = [
     "DIALECTS",
@@ -31,6 +37,7 @@ __all__ = [
     "Calibration",
     "Up",
     "guessed_up",
+    "misreading",
     "pinhole_matrix",
     "read_calibrations",
     "upright",

@@ -17,7 +17,7 @@ from posefit.geometry.calibration.lens import (
     numbers_of,
     stated,
 )
-from posefit.geometry.calibration.values import Stored, matrix_of
+from posefit.geometry.calibration.values import Stored, counts, matrix_of
 
 KEYS = {
     *("name", "size", "matrix", "distortions", "rotation", "translation", "fisheye"),
@@ -51,6 +51,12 @@ def _tables(
 
 
 def _read(stored: Stored) -> list[Calibration]:
+    # values that are in no table, such as the place of the whole rig
+    around = dict[str, Any]()
+    for key, value in stored.values.items():
+        if not isinstance(value, dict | list) or counts(value):
+            around[key] = value
+    check_others(stored.path.stem, around)
     calibrations = list[Calibration]()
     for name, table in _tables(stored.values):
         # Caliscope keeps cameras in the file that the user has left out

@@ -28,7 +28,7 @@ KINDS = ("K", "dist", "Rot", "R", "T", "H", "W", "ccm")
 def _recognises(stored: Stored) -> bool:
     if "names" not in stored.values:
         return False
-    return any(key.startswith(("K_", "Rot_")) for key in stored.values)
+    return any(key.startswith(("K_", "Rot_", "R_")) for key in stored.values)
 
 
 def _read(file: Stored) -> list[Calibration]:

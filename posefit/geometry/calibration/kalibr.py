@@ -11,6 +11,7 @@ import numpy as np
 
 from posefit.errors import InputError
 from posefit.geometry.calibration.dialect import Dialect
+from posefit.geometry.calibration.keys import check_others, unread
 from posefit.geometry.calibration.lens import (
     Calibration,
     Place,
@@ -40,9 +41,10 @@ def _recognises(stored: Stored) -> bool:
             continue
         if CHAINED not in table and "camera_model" not in table:
             continue
-        # users of OpenCV name a matrix `intrinsics`; Kalibr has four numbers
+        # users of OpenCV name a matrix `intrinsics`; Kalibr has four numbers of a
+        # pinhole, and up to six of the models that are not read
         intrinsics = table.get("intrinsics")
-        if isinstance(intrinsics, list) and len(intrinsics) == 4:
+        if isinstance(intrinsics, list) and 4 <= len(intrinsics) <= 6:
             return True
     return False
 
@@ -52,6 +54,8 @@ def _read(stored: Stored) -> list[Calibration]:
     for name, table in stored.values.items():
         if isinstance(table, dict):
             tables[name] = table
+    # such as the place of the whole rig
+    check_others(stored.path.stem, unread(stored.values, tables))
     calibrations = list[Calibration]()
     # a user added these, in a unit that Kalibr does not state
     if all({"rvec", "tvec"} <= table.keys() for table in tables.values()):

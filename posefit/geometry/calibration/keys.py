@@ -39,7 +39,7 @@ _HARMLESS = re.compile(
     r"|.*(board|square|chess|charuco|aruco|marker|pattern|corner|grid).*"
     r"|.*(points?|images?|views?|frames?|samples?)|(nr|num|number|count).*|.*count"
     # the camera's identity, and how it takes pictures
-    r"|.*(id|ids|index|serial|serialnumber|sn|port|name|version|flags?|fps|rate)"
+    r"|.*(id|ids|index|serial|serialnumber|sn|port|name|version|flags?|fps|rate|ratehz)"
     r"|.*(exposure|gain|brightness|gamma|shutter|iso|whitebalance|format|channels?)"
     r"|fov.*|.*fov|angleofview|cameraangle[xy]|distance.*|baseline.*|aspectratio"
     r"|.*(focal(length)?|lens|sensor.*|pixelsize.*|aperture.*)(mm|um)?"

@@ -247,9 +247,12 @@ def stated(
     if size is not None:
         size = _whole(size)
     if abs(matrix[1, 0]) > 1e-6 or np.abs(matrix[2] - [0.0, 0.0, 1.0]).max() > 1e-6:
+        hint = ""
+        if matrix[2, :2].any() and not matrix[:2, 2].any():
+            hint = "; transpose it if MATLAB wrote it, and the rotation, too"
         raise InputError(
             "a camera matrix that is not of the form fx 0 cx, 0 fy cy, 0 0 1: "
-            f"{quoted(matrix.tolist())}"
+            f"{quoted(matrix.tolist())}{hint}"
         )
     check_focal(np.diag(matrix)[:2], size or 2.0 * matrix[:2, 2])
     if abs(matrix[0, 1]) > MAX_SKEW * matrix[0, 0]:
@@ -312,6 +315,11 @@ def rotation_of(rotation: Any) -> Array:
                 "axes?"
             )
         return np.asarray(cv2.Rodrigues(vector)[0])
+    if np.size(rotation) == 4:
+        raise InputError(
+            f"a quaternion {quoted(np.ravel(rotation).tolist())}, whose order is not "
+            "known: give a rotation vector or a matrix (3, 3)"
+        )
     if np.shape(rotation) == (9,):
         rotation = np.reshape(rotation, (3, 3))
     return numbers_of(rotation, (3, 3))

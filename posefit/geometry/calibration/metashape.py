@@ -116,7 +116,7 @@ def _camera(name: str, sensor: Any, place: Place, scale: Any) -> Calibration:
             raise InputError(
                 f"the lens key {quoted(value.tag)} of {quoted(name)}, which is not read"
             )
-        if value.tag != "resolution":
+        if value.tag in CALIBRATION - {"resolution"}:
             values[value.tag] = number_of(value.text)
     resolution = tag_of(sensor, "resolution")
     width = number_of(resolution.get("width"))

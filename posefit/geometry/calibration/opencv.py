@@ -194,6 +194,7 @@ def _camera(
     """Return the camera of a table; `known` has its values by their `plain` keys."""
     fisheye = _is_fisheye(known)
     numbered = NUMBERED_FISHEYE if fisheye else NUMBERED
+    matrix = _matrix(known)
     lens = first_of(known, LENS)
     read = {*LENS, *MODEL, *numbered, *SIZE, *SIDES[0], *SIDES[1], *ROTATION}
     read |= {*TRANSLATION, *FOCAL, *sum(CENTRES, ()), *sum(BOARDS, ())}
@@ -215,11 +216,14 @@ def _camera(
         coefficients = known if lens is None else lens
         lens = [coefficients.get(key, 0.0) for key in numbered]
     place = _place(known)
+    # a rotation without a translation may have it under a key that is not read: that
+    # key is the mistake to name
     check_others(name, others, placed=place is not None)
+    check_both(first_of(known, ROTATION), first_of(known, TRANSLATION))
     return stated(
         name,
         _size(known),
-        _matrix(known),
+        matrix,
         matrix_of(lens),
         place,
         fisheye=fisheye,
@@ -245,11 +249,22 @@ def _is_text(value: Any) -> bool:
 
 
 def _matrix(known: Mapping[str, Any]) -> Array:
-    value = first_of(known, MATRIX)
-    if value is None:
+    key = next((key for key in MATRIX if key in known), None)
+    if key is None:
         return np.asarray(_pinhole(known))
+    value = known[key]
+    if _has_tables(value) and "data" not in value:
+        raise InputError(
+            f"a table under the key {quoted(key)}, where a camera matrix (3, 3) should "
+            "be"
+        )
     matrix = matrix_of(value)
-    return numbers_of(matrix.reshape(3, 3) if matrix.shape == (9,) else matrix, (3, 3))
+    if matrix.size != 9:
+        raise InputError(
+            f"{matrix.size} numbers under the key {quoted(key)}, where a camera matrix "
+            "(3, 3) should be"
+        )
+    return numbers_of(matrix.reshape(3, 3), (3, 3))
 
 
 def _place(known: Mapping[str, Any]) -> Place | None:
@@ -258,7 +273,6 @@ def _place(known: Mapping[str, Any]) -> Place | None:
     translation = first_of(known, TRANSLATION)
     if rotation is not None and translation is not None:
         return matrix_of(rotation), matrix_of(translation)
-    check_both(rotation, translation)
     for names in BOARDS:
         single = [matrix_of(known[key]) for key in names if key in known]
         if len(single) == 2 and all(numbers.size == 3 for numbers in single):

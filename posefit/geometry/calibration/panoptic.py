@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from posefit.geometry.calibration.dialect import Dialect
+from posefit.geometry.calibration.keys import check_others, unread
 from posefit.geometry.calibration.lens import Calibration, numbers_of, stated
 from posefit.geometry.calibration.values import (
     Stored,
@@ -23,6 +24,8 @@ def _recognises(stored: Stored) -> bool:
 
 
 def _read(stored: Stored) -> list[Calibration]:
+    around = unread(stored.values, {"cameras", "calibDataSource"})
+    check_others(stored.path.stem, around)
     calibrations = list[Calibration]()
     for number, table in enumerate(stored.values["cameras"]):
         calibrations.append(_camera(str(table.get("name", number)), table))

@@ -24,7 +24,7 @@ from posefit.geometry.calibration.ros import ROS
 from posefit.geometry.calibration.values import LARGEST_FILE, Stored, stored
 from posefit.geometry.calibration.vicon import VICON
 from posefit.geometry.calibration.voxelpose import VOXELPOSE
-from posefit.geometry.calibration.world import check_places
+from posefit.geometry.calibration.world import misreading
 from posefit.reading import cut, quoted, read_text
 
 # To add a program, add its dialect here. The first dialect that recognises a file reads
@@ -85,7 +85,8 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
         # no warnings: the checks say more about numbers that are not finite
         with np.errstate(all="ignore"):
             calibrations = dialect.read(content)
-            check_places(calibrations)
+            if wrong := misreading(calibrations):
+                raise InputError(wrong)
             for calibration in calibrations:
                 calibration.camera(calibration.size or (1000, 1000), np.eye(3))
     except (
@@ -105,10 +106,14 @@ def read_calibrations(path: str | Path) -> list[Calibration]:
             f"{path}: expected a calibration{written_by}, got {reason}"
         ) from None
     if not calibrations:
-        among = f" among {cut(', '.join(map(quoted, content.values)))}"
+        among = ""
+        if content.values:
+            among = (
+                f" among {cut(', '.join(map(quoted, content.values)))}: a camera has a "
+                "camera matrix, or fx, fy, cx and cy"
+            )
         raise InputError(
-            f"{path}: expected a calibration with a camera, got none"
-            f"{among if content.values else ''}"
+            f"{path}: expected a calibration with a camera, got none{among}"
         )
     if not chosen:
         return calibrations
@@ -126,4 +131,7 @@ def dialect_of(file: Stored) -> Dialect:
     for dialect in DIALECTS:
         if dialect.recognises(file):
             return dialect
-    raise InputError(f"XML of {quoted(file.root.tag)}, which is not known")
+    raise InputError(
+        f"XML of {quoted(file.root.tag)}, which is not known: XML of OpenCV, Qualisys, "
+        "Vicon and Metashape is read"
+    )

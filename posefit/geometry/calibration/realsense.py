@@ -38,7 +38,11 @@ def _tables(stored: Stored) -> Iterator[tuple[str, Mapping[str, Any]]]:
 
 
 def _read(stored: Stored) -> list[Calibration]:
-    return [_camera(name, table) for name, table in _tables(stored)]
+    tables = dict(_tables(stored))
+    if not stored.values.keys() >= REQUIRED:
+        # beside the cameras, a file may say where they are
+        check_others(stored.path.stem, unread(stored.values, tables))
+    return [_camera(name, table) for name, table in tables.items()]
 
 
 def _camera(name: str, table: Mapping[str, Any]) -> Calibration:

@@ -190,6 +190,8 @@ def _yaml(text: str) -> Any:
 
     # OpenCV writes %YAML:1.0; the correct directive is %YAML 1.0
     text = re.sub(r"\A\s*%YAML[^\n]*\n", "", text)
+    # rostopic ends each message with the beginning of the next one
+    text = re.sub(r"\n---\s*\Z", "\n", text)
     try:
         return yaml.load(text, Loader=yaml.BaseLoader)
     except (yaml.YAMLError, RecursionError) as error:
