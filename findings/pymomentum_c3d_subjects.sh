@@ -11,8 +11,9 @@ set -eu
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 "${PYTHON:-python3.12}" -m venv "$folder/venv"
-"$folder/venv/bin/python" -m pip install --quiet \
-    pymomentum-cpu==0.1.114.post0 numpy==2.4.6 c3d==0.6.0
+"$folder/venv/bin/python" -m pip install --quiet numpy==2.4.6 c3d==0.6.0
+# without torch, which its readers of files do not use
+"$folder/venv/bin/python" -m pip install --quiet --no-deps pymomentum-cpu==0.1.114.post0
 cd "$folder"
 venv/bin/python -W ignore - <<'PYTHON'
 from importlib.metadata import version
