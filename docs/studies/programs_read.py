@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-EXPECTED = "expected.npz"
+EXPECTED = "expected.json"
 NOT_OFFERED = "-"
 METRES = 2e-6  # tolerance of a joint; tables have micrometres
 BONE_METRES = 1e-4  # tolerance after a program's kinematics with 32-bit numbers
@@ -49,13 +49,13 @@ class Expected:
     """The content that the files of a track should have."""
 
     def __init__(self) -> None:
-        with np.load(EXPECTED) as stored:
-            self.joints = stored["joints"]  # (T, 27, 3) metres
-            self.times = stored["times"]  # (T,) seconds
-            self.held = stored["held"]  # (T,)
-            self.places = [str(name) for name in stored["places"]]
-            self.fps = float(stored["fps"])
-            self.first = int(stored["first"])
+        stored = json.loads(Path(EXPECTED).read_text())
+        self.joints = np.array(stored["joints"])  # (T, 27, 3) metres
+        self.times = np.array(stored["times"])  # (T,) seconds
+        self.held = np.array(stored["held"])  # (T,)
+        self.places: list[str] = stored["places"]
+        self.fps = float(stored["fps"])
+        self.first = int(stored["first"])
 
     @property
     def known(self) -> Any:
@@ -163,6 +163,18 @@ def opensim_scaling(expected: Expected) -> None:
     opensim.Model("placed.osim")
 
 
+def nimble_points(expected: Expected) -> None:
+    library = importlib.import_module("nimblephysics_libs._nimblephysics")
+    parser = library.biomechanics.OpenSimParser
+    # it finds no file by a relative path
+    read = parser.loadTRC(os.path.abspath("track.trc"))
+    rows = read.markerTimesteps
+    points = [[markers[name] for name in expected.places] for markers in rows]
+    known = expected.known
+    same("points", points, expected.joints[known], METRES)
+    same("times", read.timestamps, expected.times[known], SECONDS)
+
+
 def ezc3d_points(expected: Expected) -> None:
     read = importlib.import_module("ezc3d").c3d("track.c3d")
     points = read["data"]["points"][:3].transpose(2, 1, 0) / 1e3
@@ -244,6 +256,8 @@ def pybvh_joints(expected: Expected) -> None:
 
 def trimesh_body(_: Expected) -> None:
     scene = importlib.import_module("trimesh").load("track.glb")
+    if scene.graph.transforms.parents["LeftLeg"] != "LeftUpLeg":
+        raise ValueError("the joints are not a tree")
     # left, right and middle
     same("meshes", len(scene.geometry), 3, 0)
     for mesh in scene.geometry.values():
@@ -253,6 +267,7 @@ def trimesh_body(_: Expected) -> None:
 
 def pygltflib_times(expected: Expected) -> None:
     document = importlib.import_module("pygltflib").GLTF2().load("track.glb")
+    importlib.import_module("pygltflib.validator").validate(document)
     (animation,) = document.animations
     accessor = document.accessors[animation.samplers[0].input]
     view = document.bufferViews[accessor.bufferView]
@@ -286,7 +301,11 @@ def blender_armature(expected: Expected) -> None:
     (armature,) = [each for each in bpy.data.objects if each.type == "ARMATURE"]
     (skin,) = [each.type for each in bpy.data.objects["body"].modifiers]
     same("armature of the skin", float(skin == "ARMATURE"), 1.0, 0.0)
+    # the joints, and the ends of the five last bones
+    same("bones", len(armature.data.bones), len(expected.places) + 5, 0)
     rate = scene.render.fps / scene.render.fps_base
+    spanned = np.array(armature.animation_data.action.frame_range) / rate
+    same("length", spanned, expected.times[[0, -1]], 1e-5)
     knees = []
     for seconds in expected.times:
         whole, part = divmod(float(seconds) * rate, 1.0)
@@ -338,6 +357,7 @@ PROGRAMS: dict[str, dict[str, Check]] = {
         "track.mot and model.osim": opensim_motion,
     },
     "trc-data-reader": {"track.trc": trc_points},
+    "nimblephysics": {"track.trc": nimble_points},
     "ezc3d": {"track.c3d": ezc3d_points},
     "c3d": {"track.c3d": c3d_points},
     "kineticstoolkit": {"track.c3d": kineticstoolkit_points},
@@ -350,6 +370,11 @@ PROGRAMS: dict[str, dict[str, Check]] = {
     "pygltflib": {"track.glb": pygltflib_times},
     "av": {"overlay.mp4": av_frames},
     "pandas": {"frames.csv and angles.csv": pandas_tables},
+}
+# in programs_read.mjs
+NODE_PROGRAMS: dict[str, list[str]] = {
+    "gltf-validator": ["track.glb"],
+    "three": ["track.glb", "track.bvh", "track.glb on the joints of track.bvh"],
 }
 
 
