@@ -107,8 +107,6 @@ FIXED: Mapping[str, Sequence[str]] = {
     ),
     "it changes the posterior, not the pose: see posterior.py": ("MODE_DISTANCE",),
     "only other methods use them: see starts.py": (
-        "CANDIDATES",
-        "COSTS_SHARE",
         "MAX_DISTANCE",
         "TEMPERATURE",
     ),
