@@ -82,6 +82,7 @@ AS_IT_IS = "as it is"
 FIXED: Mapping[str, Sequence[str]] = {
     "they follow from other constants": (
         "MIN_EVALUATIONS",
+        "REACHES",
         "YAWS",
     ),
     "they lay out arrays, and change rounding at most": (
@@ -104,13 +105,8 @@ FIXED: Mapping[str, Sequence[str]] = {
         "SAME_TURN",
         "SIDE",
     ),
-    "they change the posterior, not the pose: see posterior.py": (
-        "MODE_DISTANCE",
-        "POSTERIOR_TEMPERATURE",
-    ),
+    "it changes the posterior, not the pose: see posterior.py": ("MODE_DISTANCE",),
     "only other methods use them: see starts.py": (
-        "CANDIDATES",
-        "COSTS_SHARE",
         "MAX_DISTANCE",
         "TEMPERATURE",
     ),
@@ -132,6 +128,11 @@ def no_pull(_noise: float) -> Array:
     return np.zeros(3 + ANGLES)
 
 
+def no_root_costs(missed: Array, *_: Any) -> Array:
+    """Return no costs (..., n) of roots."""
+    return np.zeros(missed.shape[:-1])
+
+
 # the constants and functions that differ, by `module.NAME`
 Change = Mapping[str, Any]
 # A mechanism is switched off by the constant or function that gives it its weight.
@@ -144,10 +145,7 @@ MECHANISMS: Mapping[str, Change] = {
     "no diverse states": {"beam.BEAM_SHARES": 1},
     "masks are never taken for noisy": {"cost_model.CLEAN_COST": OFF},
     "no candidates that turn away": {"proposals.CANDIDATE_TURNS": (0.0,)},
-    "roots may be anywhere": {
-        "cost_model.ROOT_SPREAD": OFF,
-        "cost_model.DEPTH_SPREAD": OFF,
-    },
+    "roots may be anywhere": {"cost_model.root_deviation_costs": no_root_costs},
     "no search everywhere after the first frame": {"path.SEARCHES_PER_SECOND": TINY},
     "parts go on at their speed": {"cost_model.SPEED_COSTS": {1.0: 0.0}},
     "no jumps": {"cost_model.JUMP_COST": 1e4},

@@ -36,8 +36,12 @@ from posefit.sweep.check import cell_of
 from posefit.uncertainty.calibration import LEVELS, Recalibration
 from posefit.uncertainty.intervals import angle_intervals, joint_intervals
 from posefit.uncertainty.modes import APART, Posterior, modes_of, poses_apart
-from posefit_exemplars.calibration import PosteriorCalibration, evidence, none_features
-from posefit_exemplars.tracker import POSTERIOR_TEMPERATURE
+from posefit_exemplars.calibration import (
+    PosteriorCalibration,
+    evidence,
+    none_features,
+    stored_calibration,
+)
 from posefit_reproduce.jobs import each
 from table import WORKERS, bar, markdown, percent
 
@@ -336,7 +340,13 @@ def _expected_error(tracks: Sequence[TrackFeatures]) -> PosteriorCalibration:
         plain.angle_factors,
     )
     return PosteriorCalibration(
-        slopes, (float(low), float(high)), *corrections, 1.0, np.zeros(3)
+        # the tracks were sampled with the present temperature
+        stored_calibration().temperature,
+        slopes,
+        (float(low), float(high)),
+        *corrections,
+        1.0,
+        np.zeros(3),
     )
 
 
@@ -643,10 +653,7 @@ def main(store: str | None, workers: int | None) -> None:
             "\n".join([*coverage_lines(evaluations), "", modes_line(evaluations)])
         )
         if file is not None:
-            fitted = {
-                "temperature": POSTERIOR_TEMPERATURE,
-                **_rounded(vars(calibration_of(tracks))),
-            }
+            fitted = _rounded(vars(calibration_of(tracks)))
             file.write_text(json.dumps(fitted) + "\n", encoding="utf-8")
 
 

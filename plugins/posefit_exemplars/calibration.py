@@ -67,6 +67,7 @@ def none_features(log_error: float) -> Array:
 class PosteriorCalibration:
     """The fitted corrections that calibrate the intervals and modes of a frame."""
 
+    temperature: float  # divides silhouette costs in the posterior
     slopes: Array  # (4,) of the logarithm of the expected error, over `evidence`
     range: tuple[float, float]  # the values of that logarithm in the training data
     joint_spreads: Array  # (27,) standard deviation per axis, in expected errors
@@ -105,10 +106,11 @@ def stored_calibration() -> PosteriorCalibration:
     )
     low, high = stored.pop("range")
     sharpness = stored.pop("sharpness")
-    # the tracker has the temperature as a constant
-    stored.pop("temperature")
+    temperature = stored.pop("temperature")
     arrays = {name: np.array(values) for name, values in stored.items()}
-    return PosteriorCalibration(range=(low, high), sharpness=sharpness, **arrays)
+    return PosteriorCalibration(
+        temperature=temperature, range=(low, high), sharpness=sharpness, **arrays
+    )
 
 
 def recalibrated(

@@ -39,11 +39,10 @@ from posefit_exemplars.lookup import YAW_TOLERANCE
 JUMP_COST = 12.0  # cost of a jump to any other pose; costs are over the temperature
 # Standard deviation of turns away from the clip, for a thirtieth of a second.
 TURN_SPREAD = np.radians(4.0)
-# Metres between an aligned root and where its clip continues, to the side or up.
-ROOT_SPREAD = 0.01
-# Metres, the same along the line of sight of a single camera. It is larger because one
+# Metres between an aligned root and where its clip continues, to the side or up. Along
+# the line of sight of a single camera it is the spread of poses, which is larger: one
 # silhouette says little about the distance from the camera.
-DEPTH_SPREAD = 0.03
+ROOT_SPREAD = 0.01
 FAST_TURN_COST = 100.0  # cost of each radian beyond the fastest possible turn
 # Cost, over the temperature, of a yaw off by twice the tolerance or more, for a
 # thirtieth of a second.
@@ -55,10 +54,9 @@ WRONG_YAW_COST = 4.0
 SHARPNESS = 2.0
 STEP_SPREAD = 4.0 / 3.0  # times the spread of the path's steps
 # A distance from the clips of d LIBRARY_DISTANCE costs LIBRARY_COST log(1 + d^2 / 2).
+# It is also the standard deviation of an unknown root from the start of a fit.
 LIBRARY_DISTANCE = 0.05  # metres
 LIBRARY_COST = 4.0  # for a thirtieth of a second
-# The same in the only frame of a track, where hypotheses are fitted longer.
-ALONE_LIBRARY_COST = 1.0
 # The trunk and each limb may go on at these multiples of their speed, at these costs.
 # Without them, tracks of damaged masks lose the person more often.
 SPEED_COSTS: Mapping[float, float] = {0.0: 0.3, 0.5: 0.1, 1.0: 0.0, 1.4: 0.15}
@@ -168,7 +166,7 @@ class ClipSteps:
             sights = lines_of_sight(after.places, camera)
             if sights is not None:
                 sights = sights.take(columns, 0)
-            cheap += root_deviation_costs(missed, sights)
+            cheap += root_deviation_costs(missed, sights, step.pose)
         costs = np.full(pose_costs.shape, JUMP_COST)
         costs.ravel()[near] = np.minimum(cheap, JUMP_COST)
         if step.max_turn < np.pi:
@@ -177,15 +175,19 @@ class ClipSteps:
         return costs
 
 
-def root_costs(places: Array, expected: Array, camera: Array | None) -> Array:
+def root_costs(
+    places: Array, expected: Array, camera: Array | None, depth_spread: float
+) -> Array:
     """Return the costs (..., n) of aligned roots at `places` (n, 3).
 
     Args:
         places: (n, 3) metres.
         expected: (..., n, 3) metres, where they were expected.
         camera: (3,) metres, the position of the only camera, or None for several.
+        depth_spread: Metres, standard deviation along the line of sight of that camera.
     """
-    return root_deviation_costs(places - expected, lines_of_sight(places, camera))
+    sights = lines_of_sight(places, camera)
+    return root_deviation_costs(places - expected, sights, depth_spread)
 
 
 def lines_of_sight(places: Array, camera: Array | None) -> Array | None:
@@ -200,7 +202,9 @@ def lines_of_sight(places: Array, camera: Array | None) -> Array | None:
     return np.asarray(sights / np.maximum(lengths, np.finfo(np.float64).tiny))
 
 
-def root_deviation_costs(missed: Array, sights: Array | None) -> Array:
+def root_deviation_costs(
+    missed: Array, sights: Array | None, depth_spread: float
+) -> Array:
     """Return the costs of aligned roots that were expected elsewhere.
 
     Args:
@@ -209,6 +213,7 @@ def root_deviation_costs(missed: Array, sights: Array | None) -> Array:
         sights: (n, 3) the `lines_of_sight`. Differences along the line of sight of a
             single camera cost less, because one silhouette says little about how far
             away a body is.
+        depth_spread: Metres, standard deviation along that line.
 
     Returns:
         The costs (..., n).
@@ -220,7 +225,7 @@ def root_deviation_costs(missed: Array, sights: Array | None) -> Array:
         along = (x * sights[:, 0] + y * sights[:, 1] + z * sights[:, 2]) ** 2
     across = x**2 + y**2 + z**2 - along
     return np.asarray(
-        np.log1p(0.5 * (across / ROOT_SPREAD**2 + along / DEPTH_SPREAD**2))
+        np.log1p(0.5 * (across / ROOT_SPREAD**2 + along / depth_spread**2))
     )
 
 
@@ -284,6 +289,7 @@ class HypothesisCosts:
         self._weight = 30.0 / task.fps
         self._temperature = temperature / SHARPNESS
         self._spread = STEP_SPREAD * spread
+        self._depth_spread = spread
 
     def of_poses(
         self, frame_costs: FrameCosts, poses: Array, places: Array, noise: float
@@ -305,10 +311,13 @@ class HypothesisCosts:
         # distance from the clips counts only as much as one view
         first_pass = frame_costs.earlier is None
         views = 1 if first_pass else frame_costs.camera_count
-        library_cost = ALONE_LIBRARY_COST if frame_costs.alone else LIBRARY_COST
+        library_cost = LIBRARY_COST / views
+        # the only frame of a track is fitted longer, so silhouettes count more again
+        if frame_costs.alone:
+            library_cost /= SHARPNESS
         distances = np.log1p(0.5 * squares / LIBRARY_DISTANCE**2)
         costs = silhouette_costs / (noise * self._temperature)
-        costs += library_cost / views * distances
+        costs += library_cost * distances
         return self._weight * costs, float(silhouette_costs.min())
 
     def of_steps(
@@ -325,7 +334,9 @@ class HypothesisCosts:
         costs = motion_step_costs(self._spread, before, after)
         if frame_costs.root is None:
             expected = (before.places + before.shifts)[:, None]
-            costs += root_costs(after.places, expected, frame_costs.camera_position)
+            costs += root_costs(
+                after.places, expected, frame_costs.camera_position, self._depth_spread
+            )
         return costs
 
 

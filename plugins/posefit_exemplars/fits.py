@@ -9,6 +9,7 @@ the body would lean to where the mask is wrong.
 """
 
 from collections.abc import Callable
+from itertools import chain
 
 import numpy as np
 
@@ -22,19 +23,20 @@ from posefit.fitting.contours import (
     precisions,
 )
 from posefit.fitting.tracker import Task
+from posefit_exemplars.cost_model import LIBRARY_DISTANCE
 from posefit_exemplars.exemplars import SAME_TURN, Exemplars
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import SAME_DISTANCE
 
 # Metres, for each step of a fit. Contours that are farther away count less.
-FRESH_REACHES = ROBUST_SCALES[:8]
-# The first step of a hypothesis that continues reaches farther, because a limb may have
-# changed its motion.
-CONTINUED_REACHES = (0.15, *FRESH_REACHES[1::2])
+REACHES = tuple(dict.fromkeys(ROBUST_SCALES))
+# A fresh hypothesis makes two steps of each reach.
+FRESH_REACHES = tuple(chain.from_iterable(zip(REACHES, REACHES, strict=True)))
+# A hypothesis that continues makes one of each, and before these one that reaches
+# farther, because a limb may have changed its motion.
+CONTINUED_REACHES = (0.15, *REACHES)
 START_TURN = np.radians(8.0)  # standard deviation of an angle from the start of a fit
-# Standard deviations of the root from its start, metres.
-KNOWN_SHIFT = 0.003
-ALIGNED_SHIFT = 0.05
+KNOWN_SHIFT = 0.003  # metres, standard deviation of a known root from its start
 # A hypothesis that continues is pulled towards the mean of the nearest poses of clips.
 # A pose gets less weight the farther away it is, compared to the nearest one:
 # `SAME_DISTANCE` is the standard deviation, and `SAME_TURN` that of an angle from the
@@ -97,7 +99,8 @@ class FrameFits:
         self._frame_costs = frame_costs
         self._contours: list[MaskContours] = frame_costs.contours(place)
         self._noise = noise
-        shift = ALIGNED_SHIFT if frame_costs.root is None else KNOWN_SHIFT
+        # an unknown root is as far from its start as poses are from those of clips
+        shift = LIBRARY_DISTANCE if frame_costs.root is None else KNOWN_SHIFT
         # the noisier the masks are, the more the start counts
         self._weights = precisions(START_TURN / noise, shift)  # (69,)
         self.evaluations = 0.0

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.arrays.compiling import state_of
 from posefit.arrays.stored import Arrays, stored
+from posefit.fitting.start import TEMPERATURE
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.body import Body
 from posefit.geometry.calibration import pinhole_matrix
@@ -42,9 +43,6 @@ DISTANCE = 4.3  # metres from the camera of a table to the person
 FIELD_OF_VIEW = 0.85  # radians, of that camera
 PICTURE = 64  # side of the camera's picture, pixels
 DIMENSIONS = 64  # dimensions of a code
-CANDIDATES = 512  # poses, nearest in the table, that are compared by their costs
-COSTS_SHARE = 0.08  # share of a frame's evaluations that these costs take, at most
-TEMPERATURE = 4.0  # divides the costs of candidates
 # Nothing is suggested if the squared distance to the nearest code is larger. 99 % of
 # damaged silhouettes of unknown people are nearer.
 MAX_DISTANCE = 16.0
@@ -256,17 +254,15 @@ class Lookup:
     def posterior(self, observation: Observation) -> Posterior | None:
         """Return the poses that a frame may show, with weights.
 
-        It is None if no pose has similar silhouettes, or if the budget is too small to
-        compare even one.
+        It is None if no pose has similar silhouettes.
         """
         if not observation.usable:
             return None
         known = self.task.yaw if observation.yaw is None else observation.yaw
         frame_costs = FrameCosts(self.task, observation)
-        affordable = int(COSTS_SHARE * self.task.evaluations / frame_costs.small_share)
-        if affordable == 0:
-            return None
-        nearest = self.nearest(observation, min(CANDIDATES, affordable), known)
+        # the square root leaves nearly all evaluations for the search
+        count = math.isqrt(int(self.task.evaluations / frame_costs.small_share))
+        nearest = self.nearest(observation, count, known)
         if nearest is None or nearest[2] > MAX_DISTANCE:
             return None
         poses = self.exemplars.with_yaws(*nearest[:2])

@@ -46,10 +46,9 @@ EVIDENCE: Mapping[str, Callable[[float], float]] = {
     "second": float,  # weight of the tracks that have left and right exchanged
     # 0 to 1: facing across the only camera's line of sight; 0 with several cameras
     "across": float,
-    # number of cameras that show something of the person, at most `MAX_VIEWS`
+    # number of cameras that show something of the person
     "views": math.log2,
 }
-MAX_VIEWS = 4  # the models were fitted with at most this many cameras
 # Names of the features: the evidence, then each of its means.
 NAMES = (
     *EVIDENCE,
@@ -81,7 +80,7 @@ def evidence_of(
         "farthest": float(distances.mean(axis=1).max()),
         "second": second_side(skeleton, frame.posterior, frame.pose),
         "across": across,
-        "views": float(min(len(visible), MAX_VIEWS)),
+        "views": float(len(visible)),
     }
     if frame.details["usable"]:
         other_costs = np.log1p(frame.details["mirror_costs"])

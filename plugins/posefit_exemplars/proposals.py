@@ -41,16 +41,13 @@ BEAM_STATES = 200  # states that a frame keeps
 # Turns away from the clip at which each candidate is tried, in standard deviations of
 # turns.
 CANDIDATE_TURNS = (0.0, -2.0, 2.0)
-# Share of the proposed states for where clips continue. The others are for a search
-# everywhere.
-CONTINUED_SHARE = 0.25
-# A search everywhere uses this share of its evaluations for poses that are similar to
-# the cheapest ones.
-SIMILAR_SHARE = 0.25
+# Share of the smaller of two parts: of the states where clips continue among all that
+# are proposed, the others being for a search everywhere; of poses similar to the
+# cheapest ones in such a search; and of reflections among the fresh hypotheses.
+SMALLER_SHARE = 0.25
 GROUP_POSES = 20  # similar poses, drawn at random from the group of each, at most
 
 FRESH_SHARE = 0.45  # share of the evaluations for fresh hypotheses
-REFLECTED_SHARE = 0.25  # share of reflections among the fresh hypotheses
 LIMB_POSES = 16  # poses of clips that lend their limbs, for each limb
 LIMB_ROUNDS = 2  # how often each limb is tried
 LIMB_ANGLES = [angles_of(bones) for bones in LIMBS.values()]
@@ -119,7 +116,7 @@ def fresh_count(evaluations: float) -> int:
 
 def reflected_count(fresh: int) -> int:
     """Return how many of the fresh hypotheses are reflections."""
-    return int(REFLECTED_SHARE * fresh)
+    return int(SMALLER_SHARE * fresh)
 
 
 class StateProposals:
@@ -144,7 +141,7 @@ class StateProposals:
         if self._task.first_pose is None:
             beam, used = self._anywhere(frame_costs, None, count, rng)
         else:
-            near_count = int(CONTINUED_SHARE * count)
+            near_count = int(SMALLER_SHARE * count)
             near = self._near_first_pose(self._task.first_pose, near_count)
             beam, used = self._anywhere(frame_costs, None, count - near_count, rng)
             beam = joined(replace(beam, totals=beam.totals + JUMP_COST), near)
@@ -166,7 +163,7 @@ class StateProposals:
             The states, their poses (n, 66), and the number of small pictures that the
             search used.
         """
-        continued_count = int(CONTINUED_SHARE * count)
+        continued_count = int(SMALLER_SHARE * count)
         beam = next_states(self.exemplars, steps, continued_count)
         used = 0
         if everywhere:
@@ -177,7 +174,9 @@ class StateProposals:
         expected = beam.places
         beam, poses = self._placed(frame_costs, beam)
         if self._task.translation != "known":
-            costs = root_costs(beam.places, expected, frame_costs.camera_position)
+            costs = root_costs(
+                beam.places, expected, frame_costs.camera_position, steps.step.pose
+            )
             beam = replace(beam, totals=beam.totals + costs)
         return beam, poses, used
 
@@ -196,7 +195,7 @@ class StateProposals:
         Returns:
             The states, and the number of small pictures that were evaluated.
         """
-        group_count = max(int(SIMILAR_SHARE * count) // GROUP_POSES, 1)
+        group_count = max(int(SMALLER_SHARE * count) // GROUP_POSES, 1)
         tried = max(count - group_count * GROUP_POSES, 1)
         known = frame_costs.yaw
         if before is None and known is None:

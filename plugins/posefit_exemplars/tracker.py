@@ -22,7 +22,7 @@ from posefit.errors import InputError
 from posefit.fitting.check import at_least, positive
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit_exemplars import markov
-from posefit_exemplars.calibration import reported
+from posefit_exemplars.calibration import reported, stored_calibration
 from posefit_exemplars.cost_model import SHARPNESS, ClipCosts, HypothesisCosts, Step
 from posefit_exemplars.lost_model import stored_classifier, with_failure_probabilities
 from posefit_exemplars.path import ClipPath, HypothesisPath
@@ -33,7 +33,6 @@ from posefit_exemplars.smoothing import FILTER_REACH, smoothed
 FIT_SHARE = 0.8
 # Evaluations per frame, at least: the hypotheses need their minimum.
 MIN_EVALUATIONS = math.ceil(min_fit_evaluations() / FIT_SHARE)
-POSTERIOR_TEMPERATURE = 8.0  # divides silhouette costs in the posterior
 
 
 class ExemplarTracker:
@@ -90,7 +89,7 @@ class ExemplarTracker:
         )
         exemplars = self.clip_path.exemplars
         costs = HypothesisCosts(task, exemplars, temperature, step.pose)
-        power = temperature / POSTERIOR_TEMPERATURE / SHARPNESS
+        power = temperature / stored_calibration().temperature / SHARPNESS
         sampling = markov.Sampling(samples, power)
         self.hypotheses = HypothesisPath(
             task, exemplars, costs, fit_evaluations, fits_ahead, sampling

@@ -135,9 +135,9 @@ def test_a_root_strays_more_easily_along_the_line_of_sight() -> None:
     # a standard deviation either way costs log(1 + 1 / 2); without a line of sight the first is 3 of them
     expected = np.stack([along, across, place])
     sights = lines_of_sight(place, camera)
-    costs = root_deviation_costs(place - expected, sights)[:, 0]
+    costs = root_deviation_costs(place - expected, sights, 0.03)[:, 0]
     np.testing.assert_allclose(costs, [np.log(1.5), np.log(1.5), 0.0], rtol=1e-6)
-    assert root_deviation_costs(place - along, None)[0] == pytest.approx(
+    assert root_deviation_costs(place - along, None, 0.03)[0] == pytest.approx(
         np.log(1.0 + 4.5)
     )
 

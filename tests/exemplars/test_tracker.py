@@ -14,6 +14,7 @@ from posefit.geometry.rotation import wrapped
 from posefit.motion import built_in, recorded
 from posefit.plugin import Array, check_tracker
 from posefit_exemplars import tracker
+from posefit_exemplars.calibration import stored_calibration
 from posefit_exemplars.cost_model import WRONG_YAW_COST, yaw_costs
 from posefit_exemplars.tracker import MIN_EVALUATIONS, ExemplarTracker
 from tests.cases import each
@@ -209,7 +210,8 @@ def test_a_greater_posterior_temperature_spreads_the_samples(
 ) -> None:
     spreads = []
     for temperature in (0.1, 0.5, 4.0):
-        monkeypatch.setattr(tracker, "POSTERIOR_TEMPERATURE", temperature)
+        calibration = replace(stored_calibration(), temperature=temperature)
+        monkeypatch.setattr(tracker, "stored_calibration", lambda c=calibration: c)
         spreads.append(
             sampled_poses(walker.track(0, 8, samples=40, **QUICK)).std(axis=1).mean()
         )
