@@ -64,7 +64,8 @@ CAMERA_DEVIATION = np.radians(0.03)
 # The largest change in a step: of the logarithm of a factor, or of a camera's turn.
 MAX_FACTOR_STEP = 0.2
 # This many frames weigh as much as what is known about people. It is more than one
-# because the errors of successive contours are correlated.
+# because the errors of successive contours are correlated. So are those of the views of
+# a frame, because people are not cones in any view. So more views weigh no more.
 BUILD_FRAMES = 2.0
 CONTOUR_WINDOW = 300  # frames that are solved together
 CONTOUR_OVERLAP = 30  # frames that two neighbouring windows share
@@ -314,11 +315,12 @@ def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Par
     steps = solved[..., 0]
     by_factor = solved[..., 1:]
     # What is known about people weighs as much as `BUILD_FRAMES` frames, however many
-    # frames there are.
+    # frames and views there are. What is known about each camera concerns its own view.
+    views = len(part.cameras)
     held = max(np.count_nonzero(part.visibility.usable) / BUILD_FRAMES, 1.0)
     values = np.append(part.factors, part.turns)
     known = np.eye(count + part.turns.size) / CAMERA_DEVIATION**2
-    known[:count, :count] = PRECISION[:count, :count]
+    known[:count, :count] = views * PRECISION[:count, :count]
     hessian = hessian + held * known - np.einsum("tni,tnj->ij", mixed, by_factor)
     gradient = gradient + held * known @ values - np.einsum("tni,tn->i", mixed, steps)
     changes = np.clip(
@@ -348,7 +350,7 @@ def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Par
         ),
         body=body,
         factors=part.factors - changes[:count],
-        spread=np.sqrt(held * np.diag(np.linalg.inv(hessian)))[:count],
+        spread=np.sqrt(views * held * np.diag(np.linalg.inv(hessian)))[:count],
         cameras=cameras,
         turns=part.turns - turns,
     )
