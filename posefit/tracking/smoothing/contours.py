@@ -65,7 +65,8 @@ CAMERA_DEVIATION = np.radians(0.03)
 # The largest change in a step: of the logarithm of a factor, or of a camera's turn.
 MAX_FACTOR_STEP = 0.2
 # This many frames weigh as much as what is known about people. It is more than one
-# because the errors of successive contours are correlated.
+# because the errors of successive contours are correlated. So are those of the views of
+# a frame, because people are not cones in any view. So more views weigh no more.
 BUILD_FRAMES = 2.0
 CONTOUR_WINDOW = 300  # frames that are solved together
 CONTOUR_OVERLAP = 30  # frames that two neighbouring windows share
@@ -333,8 +334,10 @@ def _stepped(window: _Window, borders: Sequence[MaskContours], scale: float) -> 
     schur = hessian + weight * known - np.einsum("tni,tnj->ij", mixed, by_shared)
     right = gradient + weight * known @ values - np.einsum("tni,tn->i", mixed, steps)
     shared = _limited(window, np.linalg.solve(schur, right))
-    deviations = np.sqrt(weight * np.diag(np.linalg.inv(schur)))
-    return _moved(window, angles, steps - by_shared @ shared, shared, deviations)
+    # of the factors, if `BUILD_FRAMES` frames and one view count
+    variances = np.diag(np.linalg.inv(schur))[: len(window.factors)]
+    spread = np.sqrt(len(window.cameras) * weight * variances)
+    return _moved(window, angles, steps - by_shared @ shared, shared, spread)
 
 
 def _known_of_shared(window: _Window) -> tuple[float, Array]:
@@ -346,7 +349,8 @@ def _known_of_shared(window: _Window) -> tuple[float, Array]:
     """
     count = len(window.factors)
     precision = np.eye(count + window.turns.size) / CAMERA_DEVIATION**2
-    precision[:count, :count] = PRECISION[:count, :count]
+    # against several views as much as against one; a camera turns in its own view alone
+    precision[:count, :count] = len(window.cameras) * PRECISION[:count, :count]
     # as much as `BUILD_FRAMES` frames, however many frames there are
     frames = np.count_nonzero(window.visibility.usable)
     return max(frames / BUILD_FRAMES, 1.0), precision
@@ -370,7 +374,7 @@ def _moved(
     angles: Sequence[int],
     steps: Array,
     shared: Array,
-    deviations: Array,
+    spread: Array,
 ) -> _Window:
     """Return a window after steps are subtracted from all unknowns.
 
@@ -379,7 +383,7 @@ def _moved(
         angles: The n - 3 angles that may change.
         steps: (T, n) the steps of the frames.
         shared: (s,) the step of the shared unknowns: factors, then turns of cameras.
-        deviations: (s,) the standard deviations of the shared unknowns.
+        spread: (17,) the standard deviations of the factors' logarithms.
     """
     count = len(window.factors)
     body = window.body
@@ -402,7 +406,7 @@ def _moved(
         motion=motion,
         body=body,
         factors=window.factors - shared[:count],
-        spread=deviations[:count],
+        spread=spread,
         cameras=cameras,
         turns=window.turns - turns,
     )
