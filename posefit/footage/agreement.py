@@ -114,7 +114,8 @@ def disagreement(miss: float, tall: Array, stature: float) -> str | None:
     """
     reasons = (
         "the masks show only parts of the person, or another one, "
-        "or the calibrations are in another order or unit"
+        "or the calibrations are in another order or unit, or lead from the camera to "
+        "the world"
     )
     if miss > MAX_MISS * stature:
         return (
