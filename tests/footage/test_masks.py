@@ -22,7 +22,7 @@ from posefit.footage.kinds import resolve
 from posefit.footage.numbering import Images
 from posefit.footage.options import SourceOptions, text_person
 from posefit.footage.source import FilmedBody, scene_of
-from posefit.footage.views import View, empty_planes, release
+from posefit.footage.views import View, empty_planes, full_planes, release
 from tests.cases import each
 from tests.commands import error_of, run
 from tests.footage.conftest import ALL, NOBODY, SIZE, camera, read_masks, stack
@@ -782,3 +782,24 @@ def test_released_frames_of_a_file_keep_what_was_written(
     in_memory = rows.copy()
     release(in_memory, 5)
     np.testing.assert_array_equal(in_memory, rows)
+
+
+def test_frames_whose_pixels_are_all_known_share_them() -> None:
+    size = (10, 6)
+    planes = full_planes(3, size)
+    known = planes.copy()
+    known[1, 0] = 0
+    view = View(
+        "film",
+        np.arange(3),
+        np.arange(3) / 30.0,
+        planes,
+        known,
+        np.ones(3, dtype=bool),
+        size,
+    )
+    first, second, third = (view.silhouette(k) for k in range(3))
+    assert first.valid is third.valid
+    assert first.valid.all()
+    assert not second.valid[0, :8].any()
+    assert second.valid.sum() == 52
