@@ -57,8 +57,6 @@ STEP_SPREAD = 4.0 / 3.0  # times the spread of the path's steps
 # It is also the standard deviation of an unknown root from the start of a fit.
 LIBRARY_DISTANCE = 0.05  # metres
 LIBRARY_COST = 4.0  # for a thirtieth of a second
-# The same in the only frame of a track, where hypotheses are fitted longer.
-ALONE_LIBRARY_COST = 1.0
 # The trunk and each limb may go on at these multiples of their speed, at these costs.
 # Without them, tracks of damaged masks lose the person more often.
 SPEED_COSTS: Mapping[float, float] = {0.0: 0.3, 0.5: 0.1, 1.0: 0.0, 1.4: 0.15}
@@ -313,10 +311,13 @@ class HypothesisCosts:
         # distance from the clips counts only as much as one view
         first_pass = frame_costs.observation.estimate is None
         views = 1 if first_pass else frame_costs.camera_count
-        library_cost = ALONE_LIBRARY_COST if frame_costs.alone else LIBRARY_COST
+        library_cost = LIBRARY_COST / views
+        # the only frame of a track is fitted longer, so silhouettes count more again
+        if frame_costs.alone:
+            library_cost /= SHARPNESS
         distances = np.log1p(0.5 * squares / LIBRARY_DISTANCE**2)
         costs = silhouette_costs / (noise * self._temperature)
-        costs += library_cost / views * distances
+        costs += library_cost * distances
         return self._weight * costs, float(silhouette_costs.min())
 
     def of_steps(
