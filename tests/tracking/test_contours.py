@@ -8,6 +8,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from posefit.arrays import Array
+from posefit.fitting import contour_kernels as kernels
 from posefit.fitting import contour_residuals as residuals
 from posefit.fitting import contour_twists as twists
 from posefit.fitting.contours import (
