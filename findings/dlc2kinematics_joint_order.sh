@@ -12,7 +12,7 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 "${PYTHON:-python3}" -m venv "$folder/venv"
 "$folder/venv/bin/python" -m pip install --quiet numpy==1.26.4 pandas==2.3.3 scipy==1.15.3 \
-    scikit-learn==1.7.2 matplotlib==3.10.9 scikit-kinematics==0.10.4
+    scikit-learn==1.7.2 matplotlib==3.10.9 scikit-kinematics==0.10.4 ruamel.yaml==0.19.1
 # without its viewers
 "$folder/venv/bin/python" -m pip install --quiet --no-deps dlc2kinematics==0.0.7
 cd "$folder"
