@@ -91,13 +91,9 @@ FIXED: Mapping[str, Sequence[str]] = {
         "LANES",
     ),
     "they keep numbers finite": ("MAX_KERNEL_COST",),
-    "they name a stream of random numbers": ("RNG_STREAM_TABLE",),
     "arrays on disk are learned with them": (
-        "COARSE_GROUPS",
         "DIMENSIONS",
         "DISTANCE",
-        "ELEVATION",
-        "FIELD_OF_VIEW",
         "GROUPS",
         "PICTURE",
         "POSES",
@@ -112,8 +108,6 @@ FIXED: Mapping[str, Sequence[str]] = {
     ),
     "other fits use them, too: see follow.py": ("ROBUST_SCALES", "STEP_EVALUATIONS"),
     "these tracks have no later passes, known yaws or spins": (
-        "FAST_TURN_COST",
-        "LIMB_POSES",
         "LIMB_ROUNDS",
         "WRONG_YAW_COST",
     ),
@@ -126,6 +120,11 @@ FRAMES = 24  # most frames of a clip
 def no_pull(_noise: float) -> Array:
     """Return no weight (69,) for the poses of clips."""
     return np.zeros(3 + ANGLES)
+
+
+def no_turn(_spread: float) -> Array:
+    """Return no turn but none (1,) for candidates."""
+    return np.zeros(1)
 
 
 def no_root_costs(missed: Array, *_: Any) -> Array:
@@ -142,9 +141,9 @@ MECHANISMS: Mapping[str, Change] = {
     "no fresh hypotheses but two": {"proposals.fresh_count": lambda _evaluations: 2},
     "poses of clips pull no hypothesis": {"fits.library_precisions": no_pull},
     "distance from clips costs nothing": {"cost_model.LIBRARY_COST": 0.0},
-    "no diverse states": {"beam.BEAM_SHARES": 1},
+    "no diverse states": {"beam.group_share": lambda _exemplars, count: count},
     "masks are never taken for noisy": {"cost_model.CLEAN_COST": OFF},
-    "no candidates that turn away": {"proposals.CANDIDATE_TURNS": (0.0,)},
+    "no candidates that turn away": {"proposals.candidate_turns": no_turn},
     "roots may be anywhere": {"cost_model.root_deviation_costs": no_root_costs},
     "no search everywhere after the first frame": {"path.SEARCHES_PER_SECOND": TINY},
     "parts go on at their speed": {"cost_model.SPEED_COSTS": {1.0: 0.0}},
@@ -152,7 +151,7 @@ MECHANISMS: Mapping[str, Change] = {
     "near hypotheses are not one": {"hypotheses.same_distance": lambda _cameras: 1e-4},
     "the beam has all evaluations but a fit": {"tracker.FIT_SHARE": 0.3},
     "the path's costs count as much": {"cost_model.SHARPNESS": 1.0},
-    "no smoothing over time": {"smoothing.FILTER_REACH": 0.0},
+    "no smoothing over time": {f"{CELL}.settings": {f"{METHOD}.smoothing": 0.0}},
     "half as many states": {"proposals.BEAM_STATES": 100},
     "half as many searches everywhere": {"path.SEARCHES_PER_SECOND": 5.0},
     "only the nearest group is searched": {"exemplars.NEAR_GROUPS": 1},

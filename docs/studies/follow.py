@@ -26,7 +26,8 @@ from posefit.motion import recorded
 from posefit.registry import registry
 from posefit.tracking.initialise import task_of
 from posefit.tracking.options import TrackOptions
-from posefit_exemplars.fits import CONTINUED_REACHES, KNOWN_SHIFT, START_TURN
+from posefit_exemplars.cost_model import TURN_SPREAD
+from posefit_exemplars.fits import CONTINUED_REACHES, KNOWN_SHIFT
 from posefit_exemplars.frame_costs import FrameCosts
 
 # 27 seconds, which are played forwards and backwards as often as needed
@@ -89,7 +90,7 @@ def _step_poses(task: Task, scene: Scene) -> float:
     )
     frame_costs = FrameCosts(task, scene.observations[0])
     contours = frame_costs.contours(places[0])
-    weights = precisions(START_TURN, KNOWN_SHIFT)
+    weights = precisions(TURN_SPREAD, KNOWN_SHIFT)
     jobs = (
         lambda: fitted(
             task.body, contours, (poses, places), poses, weights, CONTINUED_REACHES

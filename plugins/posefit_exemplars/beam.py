@@ -10,13 +10,8 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit_exemplars import kernels
-from posefit_exemplars.exemplars import Exemplars
+from posefit_exemplars.exemplars import YAWS, Exemplars
 from posefit_exemplars.kernels import Rows
-
-# Yaw bins in a full turn. States with the same pose and the same bin count as one.
-YAW_BINS = 36
-# Similar poses with similar yaws fill at most 1 / BEAM_SHARES of a beam.
-BEAM_SHARES = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,9 +38,9 @@ def diverse_best(
 ) -> Rows:
     """Return the rows of the `count` states of least totals, with few similar ones.
 
-    Of states with equal poses and yaw bins only the cheapest is kept. Of the states
-    with similar poses and yaws only the best few are kept: the right alternative often
-    costs more for a while, until later silhouettes confirm it.
+    Of states with equal poses and yaw bins only the cheapest is kept. Of the states of
+    one large group with similar yaws only the best few are kept, an equal share: the
+    right alternative often costs more for a while, until later silhouettes confirm it.
 
     Args:
         exemplars: The poses of clips.
@@ -56,11 +51,16 @@ def diverse_best(
     """
     bins = yaw_bins(yaws)
     order = np.argsort(totals, kind="stable")
-    keys = states * YAW_BINS + bins
-    kinds = exemplars.coarse_groups[states] * YAW_BINS + bins
-    share = max(count // BEAM_SHARES, 1)
+    keys = states * YAWS + bins
+    kinds = exemplars.coarse_groups[states] * YAWS + bins
+    share = group_share(exemplars, count)
     rows: Rows = kernels.first_distinct(order, keys, kinds, share, count)
     return rows
+
+
+def group_share(exemplars: Exemplars, count: int) -> int:
+    """Return how many of `count` states may be of one large group and yaw bin."""
+    return max(count // exemplars.coarse_count, 1)
 
 
 def joined(*beams: Beam) -> Beam:
@@ -74,6 +74,6 @@ def joined(*beams: Beam) -> Beam:
 
 def yaw_bins(yaws: Array) -> Rows:
     """Return the bin of each yaw."""
-    turns = yaws * (YAW_BINS / (2.0 * np.pi))
-    bins: Rows = np.round(turns).astype(np.int64) % YAW_BINS
+    turns = yaws * (YAWS / (2.0 * np.pi))
+    bins: Rows = np.round(turns).astype(np.int64) % YAWS
     return bins

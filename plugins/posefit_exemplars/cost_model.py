@@ -15,7 +15,7 @@ cost.
 """
 
 import math
-from collections import deque
+from bisect import insort
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Self
@@ -37,13 +37,13 @@ from posefit_exemplars.lookup import YAW_TOLERANCE
 # The path's costs.
 
 JUMP_COST = 12.0  # cost of a jump to any other pose; costs are over the temperature
-# Standard deviation of turns away from the clip, for a thirtieth of a second.
-TURN_SPREAD = np.radians(4.0)
+# Standard deviation of turns away from the clip, for a thirtieth of a second; and of an
+# angle from the start of a fit.
+TURN_SPREAD = np.radians(8.0)
 # Metres between an aligned root and where its clip continues, to the side or up. Along
 # the line of sight of a single camera it is the spread of poses, which is larger: one
 # silhouette says little about the distance from the camera.
 ROOT_SPREAD = 0.01
-FAST_TURN_COST = 100.0  # cost of each radian beyond the fastest possible turn
 # Cost, over the temperature, of a yaw off by twice the tolerance or more, for a
 # thirtieth of a second.
 WRONG_YAW_COST = 4.0
@@ -52,7 +52,6 @@ WRONG_YAW_COST = 4.0
 
 # Silhouettes cost this many times as much as on the path: fitted poses are nearer.
 SHARPNESS = 2.0
-STEP_SPREAD = 4.0 / 3.0  # times the spread of the path's steps
 # A distance from the clips of d LIBRARY_DISTANCE costs LIBRARY_COST log(1 + d^2 / 2).
 # It is also the standard deviation of an unknown root from the start of a fit.
 LIBRARY_DISTANCE = 0.05  # metres
@@ -67,8 +66,6 @@ PARTS: Sequence[Rows] = (_TRUNK, *_LIMBS)  # the joints of each
 # the body are less precise.
 CLEAN_COST = 3.0
 BEST_SHARE = 0.2  # the quantile of costs that represents the best frames
-MEMORY_SECONDS = 10.0  # frames longer ago are forgotten
-FITTED_COST_SHARE = 0.4  # estimate of the cost after a fit, before the first one
 
 
 def squared_distances(codes: Codes, others: Codes) -> Codes:
@@ -140,8 +137,8 @@ class ClipSteps:
 
         A pose costs half the square of its distance, in spreads, from where the clip
         continues. A yaw costs half the square of its turn away from the clip's yaw, in
-        spreads. A step costs at most as much as a jump, unless it turns faster than
-        possible.
+        spreads. A step costs at most as much as a jump. One that turns faster than
+        possible costs as much as a jump more.
 
         Args:
             exemplars: The poses of the clips.
@@ -171,7 +168,7 @@ class ClipSteps:
         costs.ravel()[near] = np.minimum(cheap, JUMP_COST)
         if step.max_turn < np.pi:
             turned = np.abs(wrapped(after.yaws - self.beam.yaws[:, None]))
-            costs += FAST_TURN_COST * np.maximum(turned - step.max_turn, 0.0)
+            costs[turned > step.max_turn] += JUMP_COST
         return costs
 
 
@@ -288,8 +285,7 @@ class HypothesisCosts:
         self._exemplars = exemplars
         self._weight = 30.0 / task.fps
         self._temperature = temperature / SHARPNESS
-        self._spread = STEP_SPREAD * spread
-        self._depth_spread = spread
+        self._spread = spread
 
     def of_poses(
         self, frame_costs: FrameCosts, poses: Array, places: Array, noise: float
@@ -335,7 +331,7 @@ class HypothesisCosts:
         if frame_costs.root is None:
             expected = (before.places + before.shifts)[:, None]
             costs += root_costs(
-                after.places, expected, frame_costs.camera_position, self._depth_spread
+                after.places, expected, frame_costs.camera_position, self._spread
             )
         return costs
 
@@ -382,36 +378,22 @@ def _flat(vectors: Array) -> Codes:
 
 
 class MaskNoise:
-    """How precise the masks of one camera are, judged by the best frames so far.
+    """How precise the masks of one camera are, judged by the best frames so far."""
 
-    Args:
-        fps: Frames a second.
-    """
-
-    def __init__(self, fps: float) -> None:
-        # the costs of the best hypotheses of the latest frames
-        remembered = max(round(MEMORY_SECONDS * fps), 1)
-        self._costs: deque[float] = deque(maxlen=remembered)
+    def __init__(self) -> None:
+        # the costs of the best hypotheses of all frames, the least first
+        self._costs: list[float] = []
 
     def add(self, cost: float) -> None:
         """Take the least cost of a silhouette in the next frame, per cent."""
-        self._costs.append(cost)
+        insort(self._costs, cost)
 
-    def of(
-        self, frame_costs: FrameCosts, poses: Array, places: Array
-    ) -> tuple[float, float]:
-        """Return the noise of a frame's masks, and the evaluations that this took.
+    def of(self, frame_costs: FrameCosts) -> float:
+        """Return how many times less precise a frame's masks are than clean ones.
 
-        The noise is how many times less precise the masks are than clean ones. It is 1
-        with several cameras. Before the first frame is fitted, it is estimated from the
-        costs of poses (n, 66) at places (n, 3).
+        This is 1 with several cameras, and before the first frame is fitted.
         """
-        if frame_costs.camera_count > 1:
-            return 1.0, 0.0
-        evaluations = 0.0
-        if frame_costs.usable and not self._costs:
-            least = float(frame_costs.full(poses, places).min())
-            self.add(FITTED_COST_SHARE * least)
-            evaluations = float(len(poses))
-        typical = float(np.quantile(self._costs or [0.0], BEST_SHARE))
-        return max(typical / CLEAN_COST, 1.0), evaluations
+        if frame_costs.camera_count > 1 or not self._costs:
+            return 1.0
+        typical = self._costs[int(BEST_SHARE * len(self._costs))]
+        return max(typical / CLEAN_COST, 1.0)

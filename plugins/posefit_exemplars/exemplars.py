@@ -1,6 +1,7 @@
 """The poses of recorded clips, how each continues, and codes that compare poses."""
 
 import hashlib
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -27,8 +28,8 @@ from posefit_exemplars.kernels import Codes, Rows
 MIN_FRAME_DISTANCE = 0.02
 # Radians: directions that differ by less count as similar.
 SAME_TURN = np.radians(15.0)
+YAWS = round(math.tau / SAME_TURN)  # different yaws in a full turn
 GROUPS = 1000  # groups of similar poses, at most
-COARSE_GROUPS = 40
 NEAR_GROUPS = 4  # groups that a search for the nearest poses looks into
 
 
@@ -213,6 +214,11 @@ class Exemplars:
         return len(self.angles)
 
     @cached_property
+    def coarse_count(self) -> int:
+        """The number of large groups."""
+        return int(self.coarse_groups.max()) + 1
+
+    @cached_property
     def _line(self) -> tuple[float, Array]:
         """All clips one after the other on one line of time.
 
@@ -359,7 +365,8 @@ def learned_from(
         parts.append(codes[apart])
     codes = np.concatenate(parts)
     centres, groups = farthest_first(codes, GROUPS)
-    _, coarse_groups = farthest_first(codes, COARSE_GROUPS)
+    # a few large groups, of about as many small ones each
+    _, coarse_groups = farthest_first(codes, math.isqrt(len(centres)))
     return {
         "rows": np.concatenate(rows),
         "counts": np.array([len(apart) for apart in rows]),

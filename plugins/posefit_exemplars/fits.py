@@ -23,7 +23,7 @@ from posefit.fitting.contours import (
     precisions,
 )
 from posefit.fitting.tracker import Task
-from posefit_exemplars.cost_model import LIBRARY_DISTANCE
+from posefit_exemplars.cost_model import LIBRARY_DISTANCE, TURN_SPREAD
 from posefit_exemplars.exemplars import SAME_TURN, Exemplars
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import SAME_DISTANCE
@@ -35,13 +35,13 @@ FRESH_REACHES = tuple(chain.from_iterable(zip(REACHES, REACHES, strict=True)))
 # A hypothesis that continues makes one of each, and before these one that reaches
 # farther, because a limb may have changed its motion.
 CONTINUED_REACHES = (0.15, *REACHES)
-START_TURN = np.radians(8.0)  # standard deviation of an angle from the start of a fit
 KNOWN_SHIFT = 0.003  # metres, standard deviation of a known root from its start
-# A hypothesis that continues is pulled towards the mean of the nearest poses of clips.
-# A pose gets less weight the farther away it is, compared to the nearest one:
+# How many poses of clips are enough for a sample: the similar ones whose mean pulls a
+# hypothesis that continues, those drawn from a group, and those that lend a limb. In
+# the mean, a pose gets less weight the farther away it is, compared to the nearest one:
 # `SAME_DISTANCE` is the standard deviation, and `SAME_TURN` that of an angle from the
 # mean.
-SIMILAR_POSES = 8
+FEW_POSES = 16
 
 PosesAndPlaces = tuple[Array, Array]  # (n, 66), and (n, 3) metres
 PLACES_COMPARED = 2.0  # the place where a hypothesis leads, and the aligned one
@@ -101,8 +101,9 @@ class FrameFits:
         self._noise = noise
         # an unknown root is as far from its start as poses are from those of clips
         shift = LIBRARY_DISTANCE if frame_costs.root is None else KNOWN_SHIFT
-        # the noisier the masks are, the more the start counts
-        self._weights = precisions(START_TURN / noise, shift)  # (69,)
+        # An angle strays from the start of a fit as far as a turn does from a clip. The
+        # noisier the masks are, the more the start counts.
+        self._weights = precisions(TURN_SPREAD / noise, shift)  # (69,)
         self.evaluations = 0.0
 
     def fresh(self, start: PosesAndPlaces) -> PosesAndPlaces:
@@ -170,7 +171,7 @@ class FrameFits:
         They lie between the poses themselves and the mean of similar poses of clips.
         """
         pulls = library_precisions(self._noise)
-        means = self._exemplars.nearby_mean(poses, SIMILAR_POSES, SAME_DISTANCE)
+        means = self._exemplars.nearby_mean(poses, FEW_POSES, SAME_DISTANCE)
         sums = self._weights + pulls
         shares = pulls[3:] / sums[3:]  # (66,)
         return poses + shares * (means - poses), sums

@@ -31,23 +31,18 @@ from posefit.silhouette.cost import masks_of
 from posefit.silhouette.drawn import uncounted
 from posefit.silhouette.mask import Mask, Silhouette, box_of, without_small_pieces
 from posefit.uncertainty.modes import Posterior
-from posefit_exemplars.exemplars import SAME_TURN, Exemplars, exemplars_for
+from posefit_exemplars.exemplars import SAME_TURN, YAWS, Exemplars, exemplars_for
 from posefit_exemplars.frame_costs import SIDE, FrameCosts
 from posefit_exemplars.kernels import Rows
 
 POSES = 2000  # poses in a table, drawn by `Exemplars.draw`
-YAWS = round(math.tau / SAME_TURN)  # yaws that each pose is turned to
-# There is one table for each multiple of this elevation of the camera.
-ELEVATION = np.radians(10.0)
 DISTANCE = 4.3  # metres from the camera of a table to the person
-FIELD_OF_VIEW = 0.85  # radians, of that camera
 PICTURE = 64  # side of the camera's picture, pixels
 DIMENSIONS = 64  # dimensions of a code
 # Nothing is suggested if the squared distance to the nearest code is larger. 99 % of
 # damaged silhouettes of unknown people are nearer.
 MAX_DISTANCE = 16.0
 YAW_TOLERANCE = np.radians(45.0)  # of a known yaw, to either side
-RNG_STREAM_TABLE = 61
 Codes = NDArray[np.float32]  # (n, DIMENSIONS)
 
 
@@ -87,9 +82,7 @@ def _learned(exemplars: Exemplars, elevation: float) -> Arrays:
     body = Body.of(exemplars.coding.skeleton)
     states = np.arange(len(exemplars))
     if len(states) > POSES:
-        states = np.unique(
-            exemplars.draw(POSES, np.random.default_rng(RNG_STREAM_TABLE))
-        )
+        states = np.unique(exemplars.draw(POSES, np.random.default_rng(0)))
     yaws = np.tile(SAME_TURN * np.arange(YAWS), len(states))
     poses = exemplars.with_yaws(np.repeat(states, YAWS), yaws)
     camera = looking_at(0.0, elevation)
@@ -120,9 +113,7 @@ _table = lru_cache(maxsize=4)(Table.of)
 
 def looking_at(azimuth: float, elevation: float) -> Camera:
     """Return a table's camera, which looks at the origin from these angles, radians."""
-    level = Camera.around(
-        np.zeros(3), azimuth, DISTANCE, (PICTURE, PICTURE), FIELD_OF_VIEW
-    )
+    level = Camera.around(np.zeros(3), azimuth, DISTANCE, (PICTURE, PICTURE))
     sine = np.sin(elevation)
     cosine = np.cos(elevation)
     tilt = np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]])
@@ -224,7 +215,8 @@ class Lookup:
         for camera, silhouette in pairs:
             if np.isfinite(silhouette.extent).all():
                 picture, azimuth, elevation = straightened(camera, silhouette)
-                rounded = float(np.round(elevation / ELEVATION) * ELEVATION)
+                # a table for each multiple of it
+                rounded = float(np.round(elevation / SAME_TURN) * SAME_TURN)
                 # a table is made once per process, so its poses do not count here
                 with uncounted():
                     table = _table(self.exemplars, rounded)

@@ -331,7 +331,7 @@ class HypothesisPath:
 
         The evaluations of the estimates include the fits.
         """
-        mask_noise = MaskNoise(self._task.fps)
+        mask_noise = MaskNoise()
         before: _FittedFrame | None = None
         latest = Hypotheses.none()
         rows = np.empty(0, dtype=np.int64)
@@ -343,7 +343,7 @@ class HypothesisPath:
                     latest, before.states.paths.totals, frame_costs
                 )
             fresh = self.proposals.fresh(estimate, latest, rows, rng)
-            noise, evaluations = mask_noise.of(frame_costs, *fresh)
+            noise = mask_noise.of(frame_costs)
             hypotheses, used = self._fitted(estimate, fresh, latest, rows, noise)
             pose_costs = np.zeros(len(hypotheses.poses))
             if frame_costs.usable:
@@ -352,8 +352,7 @@ class HypothesisPath:
                 )
                 mask_noise.add(least)
             joined = self._joined(frame_costs, hypotheses, pose_costs, before)
-            evaluations += estimate.evaluations + used
-            estimate = replace(estimate, evaluations=evaluations)
+            estimate = replace(estimate, evaluations=estimate.evaluations + used)
             before = _FittedFrame(estimate, hypotheses, *joined)
             yield before
 

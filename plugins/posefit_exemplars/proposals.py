@@ -28,6 +28,7 @@ from posefit_exemplars.cost_model import (
 from posefit_exemplars.estimate import Estimate
 from posefit_exemplars.exemplars import SAME_TURN, Exemplars
 from posefit_exemplars.fits import (
+    FEW_POSES,
     PosesAndPlaces,
     continued_evaluations,
     fresh_evaluations,
@@ -38,24 +39,19 @@ from posefit_exemplars.kernels import Rows
 from posefit_exemplars.lookup import YAW_TOLERANCE, Lookup
 
 BEAM_STATES = 200  # states that a frame keeps
-# Turns away from the clip at which each candidate is tried, in standard deviations of
-# turns.
-CANDIDATE_TURNS = (0.0, -2.0, 2.0)
 # Share of the smaller of two parts: of the states where clips continue among all that
 # are proposed, the others being for a search everywhere; of poses similar to the
 # cheapest ones in such a search; and of reflections among the fresh hypotheses.
 SMALLER_SHARE = 0.25
-GROUP_POSES = 20  # similar poses, drawn at random from the group of each, at most
 
 FRESH_SHARE = 0.45  # share of the evaluations for fresh hypotheses
-LIMB_POSES = 16  # poses of clips that lend their limbs, for each limb
 LIMB_ROUNDS = 2  # how often each limb is tried
 LIMB_ANGLES = [angles_of(bones) for bones in LIMBS.values()]
 
 
 def limb_evaluations() -> float:
     """Return the evaluations of a search for the cheapest limbs of a pose."""
-    return LIMB_ROUNDS * len(LIMBS) * (LIMB_POSES + 1.0)
+    return LIMB_ROUNDS * len(LIMBS) * (FEW_POSES + 1.0)
 
 
 def min_fit_evaluations() -> float:
@@ -99,7 +95,7 @@ def next_states(exemplars: Exemplars, steps: ClipSteps, count: int) -> Beam:
     order = np.argsort(totals, kind="stable")
     states = states[order]
     parents = parents[order]
-    turns = steps.step.turn * np.array(CANDIDATE_TURNS)[:, None]
+    turns = candidate_turns(steps.step.turn)[:, None]
     # turn by turn
     states = np.tile(states, len(turns))
     yaws = (steps.yaws[parents] + turns).ravel()
@@ -107,6 +103,11 @@ def next_states(exemplars: Exemplars, steps: ClipSteps, count: int) -> Beam:
     rows = diverse_best(exemplars, states, yaws, totals, count)
     places = steps.places[parents[rows % len(parents)]]
     return Beam(states[rows], yaws[rows], totals[rows], places)
+
+
+def candidate_turns(spread: float) -> Array:
+    """Return the turns (3,) at which a candidate is tried: none, and either way."""
+    return np.array([0.0, -spread, spread])
 
 
 def fresh_count(evaluations: float) -> int:
@@ -195,8 +196,8 @@ class StateProposals:
         Returns:
             The states, and the number of small pictures that were evaluated.
         """
-        group_count = max(int(SMALLER_SHARE * count) // GROUP_POSES, 1)
-        tried = max(count - group_count * GROUP_POSES, 1)
+        group_count = max(int(SMALLER_SHARE * count) // FEW_POSES, 1)
+        tried = max(count - group_count * FEW_POSES, 1)
         known = frame_costs.yaw
         if before is None and known is None:
             known = self._task.yaw
@@ -235,8 +236,8 @@ class StateProposals:
         total = 0
         for group in self.exemplars.groups[states]:
             similar = members[starts[group] : starts[group + 1]]
-            if len(similar) > GROUP_POSES:
-                similar = rng.choice(similar, GROUP_POSES, replace=False)
+            if len(similar) > FEW_POSES:
+                similar = rng.choice(similar, FEW_POSES, replace=False)
             drawn.append(similar[: count - total])
             total += len(drawn[-1])
             if total == count:
@@ -251,7 +252,7 @@ class StateProposals:
         code = self.exemplars.coding.of_poses(np.array([[yaw, 0.0, 0.0, *angles]]))[0]
         # squared distances up to a constant, which does not change their order
         squares = (codes**2).sum(axis=1) - 2.0 * (codes @ code)
-        turns = TURN_SPREAD * np.array(CANDIDATE_TURNS)
+        turns = candidate_turns(TURN_SPREAD)
         pose_count = min(count // len(turns), BEAM_STATES)
         nearest = np.argsort(squares, kind="stable")[:pose_count]
         states = np.tile(nearest, len(turns))
@@ -434,10 +435,10 @@ class HypothesisProposals:
         The motion of one arm says little about the other, so a few clips combine to
         many gestures, as in the crossover of Deutscher and Reid (2005).
         """
-        places = np.repeat(place, LIMB_POSES + 1, axis=0)
+        places = np.repeat(place, FEW_POSES + 1, axis=0)
         for limb in LIMB_ANGLES * LIMB_ROUNDS:
-            poses = np.repeat(pose, LIMB_POSES + 1, axis=0)
-            drawn = self._exemplars.draw(LIMB_POSES, rng)
+            poses = np.repeat(pose, FEW_POSES + 1, axis=0)
+            drawn = self._exemplars.draw(FEW_POSES, rng)
             poses[1:, limb] = self._exemplars.angles[drawn][:, limb]
             pose = poses[frame_costs.full(poses, places).argmin()][None]
         return pose, place

@@ -11,8 +11,6 @@ from posefit.geometry.rotation import wrapped
 from posefit_exemplars.estimate import Estimate
 from posefit_exemplars.markov import windows
 
-FILTER_REACH = 3.0  # standard deviations, to either side
-
 
 def smoothed(
     estimates: Iterable[Estimate], spread: float, ahead: int

@@ -27,7 +27,7 @@ from posefit_exemplars.cost_model import SHARPNESS, ClipCosts, HypothesisCosts, 
 from posefit_exemplars.lost_model import stored_classifier, with_failure_probabilities
 from posefit_exemplars.path import ClipPath, HypothesisPath
 from posefit_exemplars.proposals import min_fit_evaluations
-from posefit_exemplars.smoothing import FILTER_REACH, smoothed
+from posefit_exemplars.smoothing import smoothed
 
 # Fits take this share of the evaluations, and the path through the clips the rest.
 FIT_SHARE = 0.8
@@ -72,11 +72,10 @@ class ExemplarTracker:
         step = Step.of(task, spread)
         fit_evaluations = FIT_SHARE * task.evaluations
         path_evaluations = task.evaluations - fit_evaluations
-        # the smoothing uses some of the later frames, the hypotheses half of the
-        # others, and the path the rest
         self._task = task
         self._smoothing = smoothing * task.fps / 30.0  # frames
-        self._ahead = min(math.ceil(FILTER_REACH * self._smoothing), lag)
+        # smoothing, hypotheses and path use a third of the later frames each
+        self._ahead = lag // 3
         fits_ahead = (lag - self._ahead) // 2
         path_ahead = lag - self._ahead - fits_ahead
         self.clip_path = ClipPath(
