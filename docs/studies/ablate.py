@@ -91,6 +91,7 @@ FIXED: Mapping[str, Sequence[str]] = {
         "LANES",
     ),
     "they keep numbers finite": ("MAX_KERNEL_COST",),
+    "it counts what a fit evaluates": ("PLACES_COMPARED",),
     "arrays on disk are learned with them": (
         "DIMENSIONS",
         "DISTANCE",
