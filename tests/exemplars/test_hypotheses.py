@@ -211,7 +211,7 @@ def test_what_an_earlier_track_had_is_tried_with_exchanged_and_with_other_limbs(
     np.testing.assert_array_equal(mended[kept], wrong[0, kept])
 
 
-@each(("alone", "weight"), [(False, 4.0), (True, 1.0)])
+@each(("alone", "weight"), [(False, 4.0), (True, 2.0)])
 def test_beside_an_earlier_track_clips_count_half_as_much_against_two_views(
     alone: bool, weight: float
 ) -> None:
