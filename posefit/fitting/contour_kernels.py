@@ -61,7 +61,7 @@ class Views(NamedTuple):
     spacings: Array  # (V,) pixels of the border that a point represents
 
 
-class Prior(NamedTuple):
+class PosePrior(NamedTuple):
     """A Gaussian prior of n places and poses, by degree of freedom.
 
     A frame has 69 degrees of freedom, of which m may change.

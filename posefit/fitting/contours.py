@@ -350,7 +350,7 @@ def fitted(
             body.skeleton.chain,
             body.radii,
             borders,
-            kernels.Prior(free, targets[part], precisions[free]),
+            kernels.PosePrior(free, targets[part], precisions[free]),
             scale_array,
             MAX_ANGLE_STEP,
             poses[part],
