@@ -45,7 +45,7 @@ class ExemplarTracker:
             because the errors of successive frames are correlated.
         lag: Number of later frames used before a pose is reported, 0 or more.
         smoothing: Standard deviation of the smoothing over time, thirtieths of a
-            second, 0 or more.
+            second, 0 or more. It uses a third of `lag` frames to either side.
         samples: Number of tracks drawn from the posterior, 1 or more.
     """
 
